@@ -1,0 +1,5 @@
+"""``python -m mpam_calib``."""
+
+from mpam_calib.cli import main
+
+main()

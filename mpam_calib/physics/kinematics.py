@@ -1,0 +1,84 @@
+"""From the muscle's length to its radius, wall and braid angle.
+
+Every function broadcasts over its arguments. Angles are measured from the hoop direction; T = tan²α.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SIN_LIMIT = 1.0 - 1e-9
+"""Strands cannot be stretched straight: beyond this sin α the geometry is held there."""
+
+
+class Rest(NamedTuple):
+    """Geometry at rest: length L0, outer radius R0, wall t0 (m), braid angle alpha0 (rad)."""
+
+    L0: Array
+    R0: Array
+    t0: Array
+    alpha0: Array
+
+
+class Shape(NamedTuple):
+    """Geometry under load: outer radius R and wall t (m), T = tan²α, length L (m)."""
+
+    L: Array
+    R: Array
+    t: Array
+    T: Array
+
+
+def sin_braid_angle(L: Array, rest: Rest) -> Array:
+    """Sine of the braid angle at length L (m): sin α = L / B, B = L0 / sin α0 (thesis Eq. 2.1, 4.15)."""
+    return np.minimum(L / rest.L0 * np.sin(rest.alpha0), SIN_LIMIT)
+
+
+def tan2_braid_angle(L: Array, rest: Rest) -> Array:
+    """T = tan²α at length L (m), from Eq. 4.15."""
+    s2 = sin_braid_angle(L, rest) ** 2
+    return s2 / (1.0 - s2)
+
+
+def radius_inextensible_braid(L: Array, rest: Rest) -> Array:
+    """Outer radius (m) with strands of constant length: R = R0 cos α / cos α0 (thesis Eq. 2.10, 2.37)."""
+    cos = np.sqrt(1.0 - sin_braid_angle(L, rest) ** 2)
+    return rest.R0 * cos / np.cos(rest.alpha0)
+
+
+def wall_at_constant_volume(L: Array, R: Array, rest: Rest) -> Array:
+    """Wall thickness (m) of a bladder of constant volume (thesis Eq. 2.6).
+
+    L (2Rt − t²) = L0 (2 R0 t0 − t0²); the root below R. Where the wall's volume would fill the whole
+    cylinder the thickness is R.
+    """
+    section = rest.L0 * (2.0 * rest.R0 * rest.t0 - rest.t0**2) / L
+    return R - np.sqrt(np.maximum(R**2 - section, 0.0))
+
+
+def radius_constant_thickness(L: Array, rest: Rest) -> Array:
+    """Outer radius (m) of a bladder of constant volume and constant thickness (thesis Eq. 4.16)."""
+    section = rest.L0 * (2.0 * rest.R0 * rest.t0 - rest.t0**2) / L
+    return (section + rest.t0**2) / (2.0 * rest.t0)
+
+
+def shape_inextensible_braid(L: Array, rest: Rest) -> Shape:
+    """R from Eq. 2.10, t from the constant wall volume (Eq. 2.6), T from Eq. 4.15."""
+    R = radius_inextensible_braid(L, rest)
+    return Shape(L, R, wall_at_constant_volume(L, R, rest), tan2_braid_angle(L, rest))
+
+
+def shape_constant_thickness(L: Array, rest: Rest) -> Shape:
+    """R from Eq. 4.16, t = t0, T from Eq. 4.15: the thesis's own simulation."""
+    R = radius_constant_thickness(L, rest)
+    return Shape(L, R, rest.t0 + np.zeros_like(R), tan2_braid_angle(L, rest))
+
+
+def tip_shortened_length(L: Array, R: Array, rest: Rest, factor: Array) -> Array:
+    """Working length (m) with rounded tips: L′ = L − 2·factor·(π/2 − 1)(R − R0) (thesis Eq. 2.46-2.47)."""
+    return L - 2.0 * factor * (np.pi / 2.0 - 1.0) * (R - rest.R0)

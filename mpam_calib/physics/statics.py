@@ -1,0 +1,68 @@
+"""Static force terms: pressurised gas, the wall's thickness, the bladder's stress, the strands' energy.
+
+All in newtons, for pressure P in Pa and a :class:`~mpam_calib.physics.kinematics.Shape`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.physics.kinematics import Rest, Shape
+
+Array = NDArray[np.float64]
+
+
+def gas_force(P: Array, shape: Shape) -> Array:
+    """Gaylord's force of the gas on a thin wall: Pπ R² (2T − 1) (first term of thesis Eq. 3.16)."""
+    return P * np.pi * shape.R**2 * (2.0 * shape.T - 1.0)
+
+
+def thickness_force(P: Array, shape: Shape) -> Array:
+    """What the wall's thickness takes from it: Pπ [(2Rt − t²) − 2tRT] (thesis Eq. 2.9, 3.16)."""
+    R, t = shape.R, shape.t
+    return P * np.pi * ((2.0 * R * t - t**2) - 2.0 * t * R * shape.T)
+
+
+def axial_lever(shape: Shape) -> Array:
+    """Section of the wall, π(2Rt − t²), m²: what the axial stress acts on (thesis Eq. 4.10)."""
+    return np.pi * (2.0 * shape.R * shape.t - shape.t**2)
+
+
+def hoop_lever(shape: Shape) -> Array:
+    """2πRtT, m²: what the hoop stress takes from the force through the braid (thesis Eq. 4.10)."""
+    return 2.0 * np.pi * shape.R * shape.t * shape.T
+
+
+def strains(shape: Shape, rest: Rest, convention: str) -> tuple[Array, Array]:
+    """Axial and hoop argument (z, x) of the stress polynomial.
+
+    "engineering": L/L0 − 1, R/R0 − 1 (thesis Eq. 2.13-2.14); "stretch": L/L0, R/R0 (how its tables
+    must be read).
+    """
+    shift = 1.0 if convention == "engineering" else 0.0
+    return shape.L / rest.L0 - shift, shape.R / rest.R0 - shift
+
+
+def modulus_columns(shape: Shape, rest: Rest, convention: str, order: int) -> Array:
+    """Force per unit of each modulus E_k, m²; shape (..., order).
+
+    π(2Rt − t²) z^k − 2πRtT x^k for k = 1..order (thesis Eq. 4.10): the bladder's force is this
+    times the moduli.
+    """
+    z, x = strains(shape, rest, convention)
+    axial, hoop = axial_lever(shape), hoop_lever(shape)
+    return np.stack([axial * z**k - hoop * x**k for k in range(1, order + 1)], axis=-1)
+
+
+def braid_energy_force(
+    P: Array, L: Array, rest: Rest, E_br: float, R_br: float, n: int
+) -> Array:
+    """Force lost to the energy in the stretched strands, N (thesis Eq. 2.25; to be subtracted).
+
+    F_br = L/(E_br A_br n) · 4π²P²B³/(2πN)⁴ with B = L0/sin α0 and 2πN = B cos α0 / R0.
+    """
+    B = rest.L0 / np.sin(rest.alpha0)
+    turns = B * np.cos(rest.alpha0) / rest.R0
+    area = np.pi * R_br**2
+    return L / (E_br * area * n) * 4.0 * np.pi**2 * P**2 * B**3 / turns**4

@@ -1,0 +1,1 @@
+"""What was measured and declared: reading a specimen folder into SI arrays."""

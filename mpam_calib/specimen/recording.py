@@ -1,0 +1,122 @@
+"""What the rig recorded, in SI units: one frozen dataclass for each kind of file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.specimen.declaration import Braid, Csv, Fit, Geometry, Sensors, Simulation
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+LOADING, UNLOADING, NO_BRANCH = 1, -1, 0
+PRESSURISING, DEPRESSURISING = 2, -2
+"""Branch codes. Friction's sign s is the code where it is +1 or -1 and 0 otherwise."""
+
+BRANCH_WORDS: dict[str, int] = {
+    "loading": LOADING,
+    "unloading": UNLOADING,
+    "pressurising": PRESSURISING,
+    "depressurising": DEPRESSURISING,
+    "": NO_BRANCH,
+}
+
+
+@dataclass(frozen=True)
+class Loops:
+    """Force-displacement loops in time order; every array has shape (rows,).
+
+    ``stroke`` numbers the contiguous runs of one file, level, cycle and branch, from 0; ``clock``
+    numbers the files, because each file has its own clock; ``averaged`` is how many consecutive
+    rows of a very large file each entry stands for (1 otherwise).
+    """
+
+    time_s: Floats
+    pressure_Pa: Floats
+    displacement_m: Floats
+    force_N: Floats
+    level: Ints
+    cycle: Ints
+    branch: Ints
+    stroke: Ints
+    clock: Ints
+    censored: Bools
+    averaged: int = 1
+
+
+@dataclass(frozen=True)
+class ForceMap:
+    """Static force readings over pressure and contraction; arrays of shape (rows,)."""
+
+    pressure_Pa: Floats
+    contraction: Floats
+    force_N: Floats
+    level: Ints
+    branch: Ints
+    censored: Bools
+
+
+@dataclass(frozen=True)
+class BlockedForce:
+    """Blocked force against pressure; arrays of shape (rows,)."""
+
+    pressure_Pa: Floats
+    force_N: Floats
+    censored: Bools
+
+
+@dataclass(frozen=True)
+class FreeContraction:
+    """Free contraction against pressure; arrays of shape (rows,)."""
+
+    pressure_Pa: Floats
+    contraction: Floats
+
+
+@dataclass(frozen=True)
+class Tensile:
+    """Uniaxial tension of the bladder material (engineering strain and stress); shape (rows,)."""
+
+    strain: Floats
+    stress_Pa: Floats
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A specimen folder as read: what was declared and what was recorded.
+
+    ``levels_Pa`` are the pressure levels (sorted, the median reading of each) that every
+    ``level`` index of the recordings refers to; ``digest`` is a SHA-256 over the declaration
+    and the bytes of every data file.
+    """
+
+    name: str
+    bladder_material: str
+    folder: Path
+    geometry: Geometry | None
+    braid: Braid | None
+    sensors: Sensors
+    simulation: Simulation
+    fit: Fit
+    csv: Csv
+    levels_Pa: Floats
+    loops: Loops | None
+    force_map: ForceMap | None
+    blocked_force: BlockedForce | None
+    free_contraction: FreeContraction | None
+    tensile: Tensile | None
+    digest: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def has_muscle_data(self) -> bool:
+        """Whether anything but a tensile test was recorded."""
+        return any(
+            part is not None
+            for part in (self.loops, self.force_map, self.blocked_force, self.free_contraction)
+        )
