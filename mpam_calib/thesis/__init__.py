@@ -1,0 +1,1 @@
+"""The thesis, whole: its printed tables, its calibration recomputed, its misprints and their proofs."""

@@ -1,0 +1,123 @@
+"""The bundled data sets: rebuilt byte for byte, and what their READMEs say of them is so."""
+
+from __future__ import annotations
+
+import importlib.util
+import tomllib
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mpam_calib.thesis import decoded
+from mpam_calib.thesis.tables import NAMES, table
+
+DATASETS = Path(__file__).parents[2] / "datasets"
+RECONSTRUCTED = {"MPAM1": "mpam1_reconstructed", "MPAM2": "mpam2_reconstructed"}
+
+
+def script(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, DATASETS / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def loops(muscle: str) -> pd.DataFrame:
+    return pd.read_csv(DATASETS / RECONSTRUCTED[muscle] / "loops_reconstructed.csv")
+
+
+def test_the_script_writes_the_bundled_files_byte_for_byte(tmp_path: Path) -> None:
+    written = script("rebuild").rebuild(tmp_path)
+    assert len(written) == 2 + len(NAMES)
+    for path in written:
+        assert path.read_bytes() == (DATASETS / path.relative_to(tmp_path)).read_bytes(), path.name
+
+
+def test_tables_keep_their_misprints() -> None:
+    assert table("4.3").text("50", "E_4 (Pa)") == table("4.3").text("50", "E_2 (Pa)") == "-1.0822e8"
+    assert table("3.5").text("100", "Cost function (Case I)") == "39.70377"
+
+
+@pytest.mark.parametrize("muscle", RECONSTRUCTED)
+def test_readme_states_the_number_of_rows(muscle: str) -> None:
+    rows = f"{len(loops(muscle)):,} rows"
+    assert rows in (DATASETS / RECONSTRUCTED[muscle] / "README.md").read_text(encoding="utf-8")
+    assert rows in (DATASETS / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("muscle", RECONSTRUCTED)
+def test_protocol_is_the_thesis_s(muscle: str) -> None:
+    data = loops(muscle)
+    assert (np.diff(data.time_s) > 0).all()
+    assert sorted(data.setpoint_kPa.unique()) == [50, 100, 150, 200, 250]
+    for i, (_, level) in enumerate(data.groupby("setpoint_kPa")):
+        gamma0 = decoded.first_root(float(decoded.LEVELS[i]), decoded.moduli(muscle)[i])
+        assert level.displacement_mm.iloc[0] == pytest.approx(50 * gamma0, abs=1e-4)
+        assert level.displacement_mm.min() < 50 / 60 / 100
+        for _, stroke in level.groupby("branch", sort=False):
+            # 50 mm/min at 100 Hz, but for the four decimals of the file
+            assert np.abs(np.diff(stroke.displacement_mm)) == pytest.approx(50 / 60 / 100, abs=1.1e-4)
+            assert np.diff(stroke.time_s) == pytest.approx(0.01, abs=1e-9)
+
+
+@pytest.mark.parametrize("muscle", RECONSTRUCTED)
+def test_force_is_the_decoded_curve_with_its_friction_and_noise(muscle: str) -> None:
+    residuals = []
+    for i, (_, level) in enumerate(loops(muscle).groupby("setpoint_kPa")):
+        gamma = level.displacement_mm.to_numpy() / 50.0
+        P = decoded.LEVELS[i]
+        F = decoded.force(P, gamma, decoded.moduli(muscle)[i])
+        K_f = decoded.coulomb_factors()[i]
+        friction = K_f * np.abs(F) if muscle == "MPAM1" else decoded.strand_friction(P, gamma)
+        sign = np.where(level.branch == "loading", 1.0, -1.0)
+        residuals.append(level.force_N.to_numpy() - F - sign * friction)
+    noise = np.concatenate(residuals)
+    assert noise.std() == pytest.approx(0.25, rel=0.03)
+    assert abs(noise.mean()) < 0.02
+    # 0.15² / 0.25² of it is correlated; over 0.5 s nothing is left.
+    lag = [np.corrcoef(noise[:-k], noise[k:])[0, 1] for k in (1, 50)]
+    assert lag[0] == pytest.approx(0.36 * np.exp(-0.1), abs=0.04)
+    assert abs(lag[1]) < 0.03
+
+
+@pytest.mark.parametrize("folder", sorted(p.parent.name for p in DATASETS.glob("*/specimen.toml")))
+def test_every_specimen_names_files_that_are_there(folder: str) -> None:
+    declared = tomllib.loads((DATASETS / folder / "specimen.toml").read_text(encoding="utf-8"))
+    names = [n for v in declared["files"].values() for n in ([v] if isinstance(v, str) else v)]
+    assert names and all((DATASETS / folder / name).is_file() for name in names)
+    if folder.startswith("mpam"):
+        assert "reconstructed" in declared["specimen"]["name"]
+        assert "dead_band" in declared["simulation"]["effects"]
+
+
+def test_every_folder_has_a_readme_with_source_and_licence() -> None:
+    for folder in (p for p in DATASETS.iterdir() if p.is_dir() and not p.name.startswith("__")):
+        text = (folder / "README.md").read_text(encoding="utf-8")
+        assert "**Source.**" in text, folder.name
+        if not folder.name.startswith("mpam"):
+            assert "**Licence.**" in text, folder.name
+
+
+@pytest.mark.parametrize(
+    ("folder", "rows", "censored"), [("festo_dmsp10", 85, 45), ("festo_dmsp20", 126, 66)]
+)
+def test_festo_maps_are_whole(folder: str, rows: int, censored: int) -> None:
+    data = pd.read_csv(DATASETS / folder / "force_map.csv")
+    assert len(data) == rows
+    assert ((data.force_N == 0) == (data.censored == 1)).all()
+    assert data.censored.sum() == censored
+
+
+def test_the_cylinder_takes_the_higher_force_on_loading() -> None:
+    files = sorted((DATASETS / "cylinder_zillen").glob("loops_*.csv"))
+    frames = [pd.read_csv(path) for path in files]
+    assert sum(map(len, frames)) == 9307
+    for data in frames:
+        assert (np.diff(data.time_s) > 0).all()
+        assert data.cycle.max() == 10
+        force = data.groupby("branch").force_N.mean()
+        assert force["loading"] > force["unloading"] + 10
