@@ -4,8 +4,8 @@
 
 The thesis's measured loops are lost. What survives are the moduli of its Tables 4.3 and 4.7, which decode to
 the average force curves (see mpam_calib.thesis.decoded), and its friction. This script runs the thesis's
-protocol on those curves: five levels, from free contraction to L0 and back at 50 mm/min, 100 Hz, with noise of
-the size its instruments have. Nothing here was measured.
+protocol on those curves: five levels, from free contraction to L0 and back at 50 mm/min, 100 Hz, with noise
+of the size its instruments have. Nothing here was measured.
 """
 
 from __future__ import annotations

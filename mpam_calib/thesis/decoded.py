@@ -75,7 +75,8 @@ def moduli(muscle: str, corrected: bool = True) -> Array:
 
 def force(P: Array, gamma: Array, E: Array, convention: str = "stretch") -> Array:
     """Friction-free force, N (Eq. 4.6, 4.10) for moduli E of shape (..., M) that broadcast against γ."""
-    return gas_and_thickness(P, gamma) + np.sum(columns(gamma, E.shape[-1], convention) * E, axis=-1)
+    bladder: Array = np.sum(columns(gamma, E.shape[-1], convention) * E, axis=-1)
+    return gas_and_thickness(P, gamma) + bladder
 
 
 def first_root(P: float, E: Array, convention: str = "stretch", limit: float = 0.6) -> float:
@@ -101,7 +102,8 @@ def strand_friction(P: Array, gamma: Array, f_s: float = F_S) -> Array:
 
 def coulomb_factors() -> Array:
     """K_f of Table 4.10, one for each level."""
-    return table("4.10").values()[0]
+    values: Array = table("4.10").values()[0]
+    return values
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,7 @@ def table(name: str) -> PrintedTable:
     '4.6791e7'
     """
     path = files("mpam_calib.thesis") / "tables" / f"table_{name.replace('.', '_')}.csv"
-    with path.open(encoding="utf-8", newline="") as stream:
+    with path.open(encoding="utf-8") as stream:
         head, *body = list(csv.reader(stream))
     return PrintedTable(
         name=name,
