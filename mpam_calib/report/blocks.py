@@ -121,8 +121,7 @@ class DataTable:
         """Column names and whether each is aligned right."""
         named = self.formats or {}
         return [
-            (str(name), str(name) in named or _is_number(self.frame[name]))
-            for name in self.frame.columns
+            (str(name), str(name) in named or _is_number(self.frame[name])) for name in self.frame.columns
         ]
 
     @property
@@ -130,8 +129,7 @@ class DataTable:
         """Cells as text, row by row."""
         named = self.formats or {}
         columns = [
-            [_cell(value, named.get(str(name))) for value in self.frame[name]]
-            for name in self.frame.columns
+            [_cell(value, named.get(str(name))) for value in self.frame[name]] for name in self.frame.columns
         ]
         return [list(row) for row in zip(*columns, strict=True)]
 

@@ -1,0 +1,250 @@
+"""The calibration report: can I trust this number, and what does it rest on?"""
+
+from __future__ import annotations
+
+import pandas as pd
+from markupsafe import Markup
+
+from mpam_calib.report import wording
+from mpam_calib.report.figures import corner, loops, pressure, priors, residuals
+from mpam_calib.report.numbers import decimals, fixed, with_band
+from mpam_calib.report.page import (
+    Block,
+    DataTable,
+    Figure,
+    Headline,
+    KeyNumber,
+    Notice,
+    Numbers,
+    Page,
+    Section,
+    Text,
+)
+from mpam_calib.report.parameters import RIGHT, learnt_table, summary_table
+from mpam_calib.report.spoken import spoken
+from mpam_calib.report.trust import assess, covered
+from mpam_calib.report.view import CalibrationView
+
+LONG_TABLE = 12
+"""Tables with more rows are folded."""
+
+
+def calibration_page(view: CalibrationView) -> Page:
+    """The report of one calibration: a muscle, or a bladder material if only a tensile test was made."""
+    if view.tensile:
+        from mpam_calib.report.tensile import tensile_lead, tensile_sections
+
+        lead, sections = tensile_lead(view), tensile_sections(view)
+    else:
+        lead, sections = _lead(view), _sections(view)
+    notice: list[Block] = [Notice(view.provenance)] if view.provenance else []
+    kind = "Bladder material" if view.tensile else "Muscle"
+    subtitle = f"{kind} calibration" + (f" · {view.material}" if view.material else "")
+    return Page(view.name, subtitle, [*notice, *lead], [*sections, *common_sections(view)])
+
+
+def _lead(view: CalibrationView) -> list[Block]:
+    top = view.top_level_kPa
+    parts: list[Markup] = []
+    cards: list[KeyNumber] = []
+    blocked = view.at_level("blocked_force_N", top)
+    if blocked is not None:
+        value, band = _band(blocked)
+        parts.append(Markup("pulls with ") + spoken(value, band, "N", " when it is held at full length"))
+        cards.append(
+            KeyNumber("Blocked force", value, "N", f"90 % band: {band} N", f"at {top:g} kPa, friction-free")
+        )
+    free = view.at_level("free_contraction", top)
+    if free is not None:
+        value, band = _band(free, 100.0)
+        parts.append(Markup("shortens by ") + spoken(value, band, "%", " of its length without load"))
+        note = f"at {top:g} kPa, of the length at rest"
+        cards.append(KeyNumber("Free contraction", value, "%", f"90 % band: {band} %", note))
+    cards.append(_fit_card(view, "N"))
+    sentence = Markup("At {} kPa, {} {}.").format(f"{top:g}", view.name, Markup(" and ").join(parts))
+    return [Headline(sentence), Numbers(cards), assess(view)]
+
+
+def _fit_card(view: CalibrationView, unit: str) -> KeyNumber:
+    share = covered(view)
+    inside = "" if share is None else f"{100 * share:.0f} % of the readings lie inside their 90 % band"
+    if view.remainder != view.remainder:
+        return KeyNumber(
+            "Readings inside their band",
+            "–" if share is None else f"{100 * share:.0f}",
+            "%",
+            "should be 90 %",
+        )
+    size = view.remainder
+    noise = (
+        f"sensor noise: {fixed(view.noise, decimals(view.noise))} {unit}" if view.noise == view.noise else ""
+    )
+    return KeyNumber("Simulation misses by", fixed(size, decimals(size)), unit, noise, inside)
+
+
+def _band(row: pd.Series, scale: float = 1.0) -> tuple[str, str]:
+    return with_band(scale * float(row["mean"]), scale * float(row["q05"]), scale * float(row["q95"]))
+
+
+def _sections(view: CalibrationView) -> list[Section]:
+    shown = len(loops.shown_levels(view))
+    omitted = f" {shown} of {len(view.levels_kPa)} levels are shown." if shown < len(view.levels_kPa) else ""
+    branches = set(view.readings("loops", "force_map")["branch"])
+    moving = bool({"loading", "unloading"} & branches)
+    found: list[Section] = []
+    if not view.quantity("force_N").empty:
+        caption = (
+            "Dots: readings. Line: median of the calibrated simulation; dark and light bands hold the true "
+            f"force with 50 % and 90 % probability.{_noisy_words(view)}{omitted}"
+        )
+        colours = " Blue: loading (pulled back to length). Orange: unloading (contracting)." if moving else ""
+        alt = f"Force against contraction with bands at {shown} pressure levels of {view.name}."
+        found.append(
+            Section(
+                "Force against contraction",
+                [
+                    Text(wording.simulation_sentence(view.simulation)),
+                    Figure(loops.draw(view), caption + colours, alt),
+                ],
+            )
+        )
+    if not view.readings("loops", "force_map").empty:
+        found.append(_residual_section(view))
+    found.append(_pressure_section(view))
+    return found
+
+
+def _noisy_words(view: CalibrationView) -> str:
+    if view.quantity("force_N_observed").empty:
+        return ""
+    return " Dotted: where 90 % of new readings fall, sensor noise included."
+
+
+def _residual_section(view: CalibrationView) -> Section:
+    caption = (
+        "Readings minus simulation. Dots: single readings. Lines: their means over short stretches of the "
+        "stroke, one colour for each level. Grey: one sigma of the sensor noise."
+    )
+    return Section(
+        "What the simulation misses",
+        [Figure(residuals.draw(view), caption, "Residuals against contraction by level and branch.")],
+        "A simulation that is right leaves lines that wander inside the grey strip. A shape that several "
+        "levels share is physics that it leaves out.",
+    )
+
+
+def _pressure_section(view: CalibrationView) -> Section:
+    measured = not view.readings("blocked_force", "free_contraction").empty
+    caption = (
+        "Line: median. Dark and light band: 50 % and 90 %. Dots: the levels of the data; hollow where no "
+        "reading comes near." + (" Crosses: readings of the test itself." if measured else "")
+    )
+    levels = pd.DataFrame([_level_row(view, level) for level in sorted(float(x) for x in view.levels_kPa)])
+    right = dict.fromkeys(levels.columns, "{}")
+    return Section(
+        "Blocked force and free contraction",
+        [
+            Figure(
+                pressure.draw(view),
+                caption,
+                "Blocked force and free contraction against pressure with bands.",
+            ),
+            DataTable(levels, "Mean and 90 % band at each level", right, collapse=len(levels) > LONG_TABLE),
+        ],
+    )
+
+
+def _level_row(view: CalibrationView, level: float) -> dict[str, str]:
+    row = {"pressure (kPa)": f"{level:g}"}
+    for name, quantity, scale in (
+        ("blocked force (N)", "blocked_force_N", 1.0),
+        ("free contraction (%)", "free_contraction", 100.0),
+    ):
+        found = view.at_level(quantity, level)
+        mean, band = ("–", "–") if found is None else _band(found, scale)
+        row |= {name: mean, f"90 % band of the {name.split(' (')[0]}": band}
+    return row
+
+
+def common_sections(view: CalibrationView) -> list[Section]:
+    """Parameters, their pairs, convergence, identification, data: the same for every calibration."""
+    return [
+        *_parameter_sections(view),
+        _convergence_section(view),
+        _identified_section(view),
+        _data_section(view),
+    ]
+
+
+def _parameter_sections(view: CalibrationView) -> list[Section]:
+    names = view.shown_parameters()
+    columns = ["parameter", "what it is", "unit", "mean", "90 % band", "sd", "prior sd"]
+    full = summary_table(view)
+    blocks: list[Block] = []
+    if names:
+        head = summary_table(view, names)
+        blocks.append(DataTable(head[columns], "Headline parameters", RIGHT))
+        caption = (
+            "Blue: after the data. Grey: before them (prior), cut off where it runs on beyond the picture."
+        )
+        blocks.append(
+            Figure(priors.draw(view), caption, "Prior and posterior density of each headline parameter.")
+        )
+    caption = f"All {len(full)} parameters, with sampling diagnostics"
+    blocks.append(DataTable(full, caption, RIGHT, collapse=bool(names)))
+    note = "A parameter whose blue and grey curves coincide has learnt nothing from the data."
+    found = [Section("Parameters", blocks, note if names else "")]
+    if len(names) > 1:
+        found.append(_pairs_section(view))
+    return found
+
+
+def _pairs_section(view: CalibrationView) -> Section:
+    blocks: list[Block] = []
+    strong = [(a, b, r) for a, b, r in corner.correlations(view) if abs(r) >= 0.8][:3]
+    if strong:
+        listed = "; ".join(f"{a} and {b} ({'+' if r > 0 else '−'}{abs(r):.2f})" for a, b, r in strong)
+        blocks.append(
+            Text(
+                f"Strongly linked (correlation): {listed}. A change in one is made up for by the other: "
+                "quote them together or not at all."
+            )
+        )
+    caption = (
+        "Dark and light regions hold 50 % and 90 % of the plausible pairs. "
+        "A thin slanted region is a trade-off."
+    )
+    blocks.append(Figure(corner.draw(view), caption, "Corner plot of the headline parameters."))
+    return Section("Which parameters trade off", blocks)
+
+
+def _convergence_section(view: CalibrationView) -> Section:
+    return Section("Has the sampler settled?", [Text(wording.convergence_sentences(view.convergence))])
+
+
+def _identified_section(view: CalibrationView) -> Section:
+    if view.unidentified.empty:
+        return Section(
+            "What the data could not identify",
+            [Text("Every parameter became much narrower than its prior: the data determine them all.")],
+        )
+    table = learnt_table(view)
+    note = "“Learnt” is how much narrower than its prior a parameter became: 0 % is nothing, 100 % is everything."
+    caption = "Least identified first"
+    return Section(
+        "What the data could not identify",
+        [DataTable(table, caption, RIGHT, collapse=len(table) > 2 * LONG_TABLE)],
+        note,
+    )
+
+
+def _data_section(view: CalibrationView) -> Section:
+    blocks: list[Block] = [Notice(text) for text in view.warnings]
+    if not view.data_files.empty:
+        blocks.append(DataTable(view.data_files, "Files read"))
+    if view.settings:
+        settings = pd.DataFrame({"setting": list(view.settings), "value": list(view.settings.values())})
+        blocks.append(
+            DataTable(settings, "Settings: with the same seed, data and versions the same numbers come out")
+        )
+    return Section("Data and settings", blocks)

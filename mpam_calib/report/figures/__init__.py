@@ -1,0 +1,1 @@
+"""The reports' figures: one concept for each file, one style for all."""

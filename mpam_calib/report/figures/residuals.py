@@ -1,0 +1,95 @@
+"""What the simulation misses: readings minus simulation along the stroke."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from mpam_calib.report.figures import style
+from mpam_calib.report.view import CalibrationView, Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+BINS = 24
+POINTS_ON_PAGE = 1500
+
+
+def draw(view: CalibrationView) -> Figure:
+    """One panel for each branch, a line for each level: means over short stretches of the stroke."""
+    if view.tensile:
+        readings = view.readings("tensile").assign(branch="mean", level_kPa=0.0)
+    else:
+        readings = view.readings("loops", "force_map")
+    readings = readings[~readings["censored"].fillna(False).astype(bool)]
+    readings = readings.assign(residual=readings["force_N"] - readings["fitted_N"])
+    known = [b for b in style.BRANCH_WORDS if b in set(readings["branch"])]
+    groups = [(b, readings[readings["branch"] == b]) for b in known]
+    rest = readings[~readings["branch"].isin(known)]
+    if len(rest):
+        groups.append(("", rest))
+    levels = sorted(readings["level_kPa"].unique())
+    colours = style.level_colours(levels)
+    with style.applied():
+        figure = style.new_figure(3.3)
+        axes = figure.subplots(1, max(len(groups), 1), sharey=True, squeeze=False)[0]
+        for ax, (branch, rows) in zip(axes, groups, strict=False):
+            _panel(ax, view, rows, colours, POINTS_ON_PAGE // len(groups))
+            ax.set_title("" if view.tensile else style.BRANCH_WORDS.get(branch, "all readings"))
+            ax.set_xlabel("strain" if view.tensile else "contraction (% of the length at rest)")
+        axes[0].set_ylabel(f"reading − simulation ({'Pa' if view.tensile else 'N'})")
+        if not view.tensile:
+            _label_levels(axes[-1], levels, colours)
+    return figure
+
+
+def _panel(
+    ax: Axes,
+    view: CalibrationView,
+    rows: pd.DataFrame,
+    colours: dict[float, tuple[float, float, float, float]],
+    points: int,
+) -> None:
+    scale = 1.0 if view.tensile else 100.0
+    if math.isfinite(view.noise):
+        ax.axhspan(-view.noise, view.noise, color="#eceff3", linewidth=0)
+    ax.axhline(0.0, color=style.GREY, linewidth=0.8)
+    for level, group in rows.groupby("level_kPa", sort=True):
+        colour = colours[float(level)]  # type: ignore[arg-type]
+        kept = style.thinned(group.sort_values("contraction", kind="stable"), max(points // len(colours), 20))
+        ax.plot(
+            scale * kept["contraction"], kept["residual"], ".", color=colour, markersize=2.2, alpha=0.30,
+            markeredgewidth=0,
+        )  # fmt: skip
+        x, y = binned(group["contraction"].to_numpy(float), group["residual"].to_numpy(float))
+        ax.plot(scale * x, y, color=colour, linewidth=1.5)
+
+
+def binned(x: Floats, y: Floats, bins: int = BINS) -> tuple[Floats, Floats]:
+    """Means of x and y over stretches of equal length; shape (filled bins,)."""
+    if len(x) == 0:
+        return x, y
+    low, high = float(x.min()), float(x.max())
+    width = (high - low) or 1.0
+    place = np.minimum(((x - low) / width * bins).astype(int), bins - 1)
+    count = np.bincount(place, minlength=bins)
+    filled = count > 0
+    sums = (np.bincount(place, weights=v, minlength=bins)[filled] for v in (x, y))
+    mean_x, mean_y = (s / count[filled] for s in sums)
+    return mean_x, mean_y
+
+
+def _label_levels(
+    ax: Axes, levels: list[float], colours: dict[float, tuple[float, float, float, float]]
+) -> None:
+    """Levels as coloured words in the margin, highest on top."""
+    shown = style.spread(levels, 12)
+    for i, level in enumerate(reversed(shown)):
+        ax.text(
+            1.03, 0.95 - 0.075 * i, f"{level:g} kPa", color=colours[level], transform=ax.transAxes,
+            va="top", fontweight="bold", fontsize=8,
+        )  # fmt: skip

@@ -1,0 +1,69 @@
+"""Tables of parameters as the report prints them."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from mpam_calib.report.glossary import meaning
+from mpam_calib.report.numbers import significant, with_band
+from mpam_calib.report.trust import UNIDENTIFIED
+from mpam_calib.report.view import CalibrationView
+
+RIGHT = dict.fromkeys(
+    ("mean", "sd", "90 % band", "prior sd", "R-hat", "ESS bulk", "ESS tail", "learnt"), "{}"
+)
+"""Columns that hold printed numbers: aligned right."""
+
+
+def summary_table(view: CalibrationView, names: list[str] | None = None) -> pd.DataFrame:
+    """``summary`` for print: all parameters, or the named ones in their order, with their meaning."""
+    frame = view.summary
+    if names is not None:
+        order = {name: i for i, name in enumerate(names)}
+        frame = frame[frame["parameter"].isin(names)]
+        frame = frame.sort_values("parameter", key=lambda column: column.map(order), kind="stable")
+    rows = []
+    for row in frame.to_dict("records"):
+        mean, band = with_band(float(row["mean"]), float(row["q05"]), float(row["q95"]))
+        unit = row["unit"] if isinstance(row["unit"], str) else ""
+        rows.append(
+            {
+                "parameter": row["parameter"],
+                "what it is": meaning(str(row["parameter"])),
+                "unit": unit,
+                "mean": mean,
+                "90 % band": band,
+                "sd": significant(float(row["sd"]), 2),
+                "prior sd": significant(float(row["prior_sd"]), 2),
+                "R-hat": f"{row['rhat']:.3f}",
+                "ESS bulk": f"{row['ess_bulk']:.0f}",
+                "ESS tail": f"{row['ess_tail']:.0f}",
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def learnt_table(view: CalibrationView) -> pd.DataFrame:
+    """How much narrower than its prior each parameter became, least first."""
+    rows = []
+    for row in view.unidentified.sort_values("contraction", kind="stable").to_dict("records"):
+        learnt = float(row["contraction"])
+        sentence = row.get("sentence")
+        rows.append(
+            {
+                "parameter": row["parameter"],
+                "prior sd": significant(float(row["prior_sd"]), 2),
+                "sd": significant(float(row["posterior_sd"]), 2),
+                "learnt": f"{100 * max(learnt, 0.0):.0f} %",
+                "what that means": sentence if isinstance(sentence, str) and sentence else _sentence(learnt),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _sentence(learnt: float) -> str:
+    if learnt < UNIDENTIFIED:
+        return "The data say nothing about it: what you see is the prior."
+    if learnt < 0.5:
+        return "The data say a little; the prior still matters."
+    return "The data determine it."

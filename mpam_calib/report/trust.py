@@ -1,0 +1,278 @@
+"""Whether to trust a calibration's numbers, and what limits them: a handful of plain checks.
+
+Each check looks at one thing and returns a :class:`Limit` or None. The verdict is the worst limit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from mpam_calib.report.blocks import Level, Verdict
+from mpam_calib.report.numbers import significant
+from mpam_calib.report.view import CalibrationView
+
+RHAT_LIMIT: Final = 1.01
+ESS_LIMIT: Final = 400.0
+REMAINDER_CAUTION: Final = 0.02
+"""A remainder above the noise and above this share of the top force is worth a caution ..."""
+REMAINDER_BAD: Final = 0.10
+"""... and above this share the simulation is not a description of the muscle."""
+WIDE_CAUTION: Final = 0.10
+WIDE_BAD: Final = 0.30
+"""Half of the 90 % band over the value."""
+COVERAGE_CAUTION: Final = 0.80
+COVERAGE_BAD: Final = 0.60
+"""Share of the readings inside bands that should hold 90 % of them."""
+COVERAGE_MIN_ROWS: Final = 20
+UNIDENTIFIED: Final = 0.20
+"""A posterior that is narrower than its prior by less than this share learnt nothing."""
+GAUGE_SHARE: Final = 0.5
+"""The gauge limits the result when it makes up this share of the band."""
+Z90: Final = 1.6449
+"""sigmas in half a central 90 % interval"""
+
+_RANK: dict[Level, int] = {"good": 0, "caution": 1, "bad": 2}
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Something that limits the numbers: how badly, in a full sentence, and in a few words.
+
+    A limit of level "good" is a remark: worth knowing, but the numbers with their bands stand.
+    """
+
+    level: Level
+    sentence: str
+    brief: str
+
+
+def convergence(view: CalibrationView) -> Limit | None:
+    """The sampler has not settled, or ended in several separate explanations."""
+    c = view.convergence
+    failed = []
+    if not c.rhat_max <= RHAT_LIMIT:
+        failed.append(
+            f"independent starts disagree on {c.rhat_parameter} (R-hat {c.rhat_max:.3f}, limit {RHAT_LIMIT})"
+        )
+    ess = min(c.ess_bulk_min, c.ess_tail_min)
+    if not ess >= ESS_LIMIT:
+        failed.append(f"the draws are worth only {ess:.0f} independent ones ({ESS_LIMIT:.0f} wanted)")
+    if failed or not c.converged:
+        why = "; ".join(failed) or "it was stopped by its step budget"
+        sentence = (
+            f"The sampler has not settled: {why}. Run it longer (--max-steps) before using any number here."
+        )
+        return Limit("bad", sentence, "the sampler has not settled")
+    if c.modes > 1:
+        sentence = f"The data allow {c.modes} separate explanations; the bands mix them."
+        return Limit("caution", sentence, f"there are {c.modes} separate explanations")
+    return None
+
+
+def remainder(view: CalibrationView) -> Limit | None:
+    """The simulation misses the data by more than the sensor's noise."""
+    top = _top_value(view)
+    if not (math.isfinite(view.remainder) and math.isfinite(view.noise)) or top <= 0:
+        return None
+    share = view.remainder / top
+    if view.remainder <= view.noise or share <= REMAINDER_CAUTION / 4:
+        return None
+    unit = "Pa" if view.tensile else "N"
+    size = f"{significant(view.remainder, 2)} {unit}"
+    largest = "stress" if view.tensile else "blocked force"
+    sentence = (
+        f"The simulation is wrong by about {size} (root mean square, {100 * share:.1f} % of the largest "
+        f"{largest}; sensor noise: {significant(view.noise, 2)} {unit}). "
+        "The bands include this. `diagnose` looks for the cause."
+    )
+    level: Level = "good" if share <= REMAINDER_CAUTION else "caution" if share <= REMAINDER_BAD else "bad"
+    return Limit(level, sentence, f"the simulation is wrong by about {size}")
+
+
+def band_width(view: CalibrationView) -> Limit | None:
+    """The band of a headline number is wide."""
+    worst, words = 0.0, ""
+    for name, mean, low, high in headline_bands(view):
+        half = (high - low) / 2.0
+        relative = half / abs(mean) if mean else math.inf
+        if relative > worst:
+            worst, words = relative, f"the {name} is known to ± {100 * relative:.0f} % only"
+    if worst <= WIDE_CAUTION:
+        return None
+    level: Level = "bad" if worst > WIDE_BAD else "caution"
+    if math.isinf(worst):
+        words = "a headline number is zero within its band"
+    return Limit(level, f"{words[0].upper()}{words[1:]} (half of its 90 % band).", words)
+
+
+def extrapolation(view: CalibrationView) -> Limit | None:
+    """A headline number lies outside the readings."""
+    if view.tensile:
+        return None
+    names = []
+    for quantity, words in (("blocked_force_N", "blocked force"), ("free_contraction", "free contraction")):
+        row = view.at_level(quantity, view.top_level_kPa)
+        if row is not None and bool(row["extrapolated"]):
+            names.append(words)
+    if not names:
+        return None
+    sentence = (
+        f"No reading comes near the {' or the '.join(names)} at {view.top_level_kPa:g} kPa: "
+        "the simulation carries the number there, not the data."
+    )
+    return Limit("caution", sentence, f"the {' and the '.join(names)} are extrapolated")
+
+
+def coverage(view: CalibrationView) -> Limit | None:
+    """The bands do not hold the share of readings that they promise."""
+    share = covered(view)
+    if share is None or share >= COVERAGE_CAUTION:
+        return None
+    level: Level = "bad" if share < COVERAGE_BAD else "caution"
+    sentence = f"Only {100 * share:.0f} % of the readings lie inside bands that should hold 90 % of them."
+    return Limit(level, sentence, "the bands are too narrow for the data")
+
+
+def gauge(view: CalibrationView) -> Limit | None:
+    """The declared uncertainty of the pressure gauge makes up most of the band."""
+    if view.tensile or view.pressure_bias_sd_kPa <= 0:
+        return None
+    rows = view.quantity("blocked_force_N")
+    rows = rows[rows["pressure_kPa"] <= view.top_level_kPa * (1 + 1e-9)]
+    if len(rows) < 2:
+        return None
+    P, F = rows["pressure_kPa"].to_numpy(), rows["mean"].to_numpy()
+    slope = abs(float(F[-1] - F[-2]) / float(P[-1] - P[-2])) if P[-1] > P[-2] else 0.0
+    newtons = Z90 * view.pressure_bias_sd_kPa * slope
+    row = rows.iloc[-1]
+    half = float(row["q95"] - row["q05"]) / 2.0
+    if newtons < GAUGE_SHARE * half or half <= 0:
+        return None
+    sentence = (
+        f"The pressure gauge sets the width of the band: ± {view.pressure_bias_sd_kPa:g} kPa (one sigma) "
+        f"alone is worth ± {significant(newtons, 2)} N (90 %). More loops do not help; a better gauge does."
+    )
+    return Limit("good", sentence, "the pressure gauge sets the width of the band")
+
+
+def identification(view: CalibrationView) -> Limit | None:
+    """Parameters on which the data say nothing beyond their priors."""
+    names = unidentified_names(view)
+    if not names:
+        return None
+    listed = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+    them = "it" if len(names) == 1 else "them"
+    sentence = f"Do not quote {listed} alone: the data say nothing about {them} beyond the prior."
+    return Limit("good", sentence, f"the data say nothing about {listed}")
+
+
+def source(view: CalibrationView) -> Limit | None:
+    """The data are not measurements."""
+    if "reconstructed" not in view.provenance.lower():
+        return None
+    sentence = (
+        "The data are reconstructed from printed tables: this describes those tables, not a muscle on a rig."
+    )
+    return Limit("caution", sentence, "the data are reconstructed, not measured")
+
+
+def _always(view: CalibrationView) -> bool:
+    return True
+
+
+@dataclass(frozen=True)
+class Check:
+    """A check, what holds when it finds nothing ("": not worth saying), and whether it could be made."""
+
+    find: Callable[[CalibrationView], Limit | None]
+    holds: str = ""
+    possible: Callable[[CalibrationView], bool] = _always
+
+
+CHECKS: tuple[Check, ...] = (
+    Check(convergence, "the sampler has settled"),
+    Check(coverage, "the bands hold the readings that they should", lambda view: covered(view) is not None),
+    Check(
+        remainder,
+        "the simulation fits to within the noise or half a per cent",
+        lambda view: math.isfinite(view.remainder) and math.isfinite(view.noise),
+    ),
+    Check(band_width, f"the bands are within ± {100 * WIDE_CAUTION:.0f} %"),
+    Check(extrapolation, "nothing is extrapolated", lambda view: not view.tensile),
+    Check(source),
+    Check(gauge),
+    Check(identification, "every parameter is identified", lambda view: not view.unidentified.empty),
+)
+
+
+def assess(view: CalibrationView) -> Verdict:
+    """The verdict on the headline numbers: sentence, level, and reasons with the worst first.
+
+    A check that the data do not allow is neither a limit nor good news: it is left out.
+    """
+    limits: list[Limit] = []
+    in_order: list[str] = []
+    for check in CHECKS:
+        limit = check.find(view)
+        if limit is not None:
+            limits.append(limit)
+        elif check.holds and check.possible(view):
+            in_order.append(check.holds)
+    limits.sort(key=lambda limit: -_RANK[limit.level])
+    level: Level = limits[0].level if limits else "good"
+    reasons = [limit.sentence for limit in limits]
+    if in_order:
+        reasons.append(f"In order: {'; '.join(in_order)}.")
+    return Verdict(_sentence(level, limits), level, reasons)
+
+
+def _sentence(level: Level, limits: list[Limit]) -> str:
+    if level == "bad":
+        return f"No, do not rely on these numbers: {limits[0].brief}."
+    if level == "caution":
+        others = " and ".join(x.brief for x in limits if x.level == "caution")
+        return f"Use these numbers with care: {others}."
+    if limits:
+        return f"Yes, with these bands; {limits[0].brief}."
+    return "Yes: you can use these numbers with their bands."
+
+
+def headline_bands(view: CalibrationView) -> list[tuple[str, float, float, float]]:
+    """Name, mean, q05 and q95 of each headline number, in its own unit."""
+    if view.tensile:
+        rows = view.stress()
+        chosen = [("stress at the largest strain", rows.iloc[-1])]
+    else:
+        pairs = (("blocked force", "blocked_force_N"), ("free contraction", "free_contraction"))
+        chosen = []
+        for words, quantity in pairs:
+            row = view.at_level(quantity, view.top_level_kPa)
+            if row is not None:
+                chosen.append((words, row))
+    return [(words, float(row["mean"]), float(row["q05"]), float(row["q95"])) for words, row in chosen]
+
+
+def covered(view: CalibrationView) -> float | None:
+    """Share of uncensored force readings within 90 % of their predictive sd; None if there are few."""
+    rows = view.readings("loops", "force_map", "blocked_force", "tensile")
+    rows = rows[~rows["censored"].fillna(False).astype(bool)]
+    z = (rows["force_N"] - rows["fitted_N"]).abs() / rows["sd_N"]
+    z = z[z.notna()]
+    return float((z <= Z90).mean()) if len(z) >= COVERAGE_MIN_ROWS else None
+
+
+def unidentified_names(view: CalibrationView) -> list[str]:
+    """Parameters whose posterior is hardly narrower than their prior, least identified first."""
+    frame = view.unidentified
+    if frame.empty:
+        return []
+    rows = frame[frame["contraction"] < UNIDENTIFIED].sort_values("contraction", kind="stable")
+    return [str(name) for name in rows["parameter"]]
+
+
+def _top_value(view: CalibrationView) -> float:
+    bands = headline_bands(view)
+    return abs(bands[0][1]) if bands else 0.0

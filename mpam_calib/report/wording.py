@@ -1,0 +1,84 @@
+"""Sentences of the calibration report: what was simulated and whether the sampler settled."""
+
+from __future__ import annotations
+
+import math
+
+from mpam_calib.report.trust import ESS_LIMIT, RHAT_LIMIT
+from mpam_calib.report.view import Convergence
+from mpam_calib.specimen.declaration import Simulation
+
+_KINEMATICS = {
+    "inextensible_braid": "the braid's strands keep their length and the bladder its volume",
+    "constant_thickness": "the radius follows a bladder of constant volume and constant thickness",
+}
+_MEASURE = {"engineering": "engineering strain", "stretch": "stretch"}
+_FRICTION = {
+    "coulomb": "friction in proportion to the force (Coulomb)",
+    "strand": "friction between the braid's strands",
+    "none": "no friction",
+}
+_LAW = {
+    "constant": "the same at every pressure",
+    "linear": "linear in pressure",
+    "exponential": "a sum of two exponentials of pressure with shared rates",
+    "exponential_each": "a sum of two exponentials of pressure, with rates for each modulus",
+    "free": "free at each pressure level",
+}
+
+
+def simulation_sentence(simulation: Simulation) -> str:
+    """The declared simulation of a muscle in one sentence."""
+    per_level = ", one value per level" if simulation.friction_by_pressure else ""
+    if simulation.moduli == "tensile":
+        moduli = "the bladder's stiffness comes from a tensile test"
+    elif simulation.moduli.startswith("run:"):
+        moduli = f"the bladder's stiffness comes from the run {simulation.moduli.removeprefix('run:')}"
+    else:
+        moduli = (
+            f"the bladder's stress is a polynomial of order {simulation.order} in "
+            f"{_MEASURE[simulation.strain]}, its moduli {_LAW[simulation.law]}"
+        )
+    effects = ", ".join(simulation.effects) or "none"
+    return (
+        f"The simulation: {_KINEMATICS[simulation.kinematics]}; {moduli}; {_FRICTION[simulation.friction]}"
+        f"{per_level}; further effects: {effects}."
+    )
+
+
+def material_sentence(simulation: Simulation) -> str:
+    """The law of a bladder material in one sentence."""
+    return f"The law: stress is a polynomial of order {simulation.order} in {_MEASURE[simulation.strain]}."
+
+
+def convergence_sentences(c: Convergence) -> str:
+    """Whether the sampler settled, for a reader who has never run one; paragraphs."""
+    ess = min(c.ess_bulk_min, c.ess_tail_min)
+    settled = (
+        "Yes."
+        if c.converged and c.rhat_max <= RHAT_LIMIT and ess >= ESS_LIMIT
+        else "No: treat every number on this page as provisional."
+    )
+    start = (
+        f"{settled} The answer is a cloud of {c.draws:,} plausible parameter sets. {c.ensembles} groups of "
+        f"{c.walkers} walkers began far apart and walked {c.steps:,} steps without knowing of each "
+        "other. If they end in the same place, the answer does not depend on where they began."
+    )
+    agreement = (
+        f"Agreement (R-hat): {c.rhat_max:.3f} at worst, for {c.rhat_parameter}; 1 is perfect, {RHAT_LIMIT} "
+        f"is the limit. Sample size (ESS): the cloud is worth {ess:,.0f} independent draws at worst; "
+        f"{ESS_LIMIT:.0f} is the least."
+    )
+    if ess > 0 and math.isfinite(ess):
+        agreement += (
+            f" Sampling therefore moves a mean by about {100 / math.sqrt(ess):.1f} % of its own sd, which "
+            "the printed digits do not show."
+        )
+    if math.isfinite(c.acceptance):
+        agreement += f" {100 * c.acceptance:.0f} % of the proposed steps were taken."
+    modes = (
+        "All of them found the same explanation of the data."
+        if c.modes <= 1
+        else f"They found {c.modes} separate explanations; more data, not more steps, must choose."
+    )
+    return f"{start}\n\n{agreement}\n\n{modes}"
