@@ -95,6 +95,11 @@ class Figure:
     kind: ClassVar[str] = "figure"
 
     @property
+    def width_rem(self) -> float:
+        """Width on the page, so that text is as large in every figure."""
+        return 7.4 * float(self.figure.get_figwidth())
+
+    @property
     def data_uri(self) -> str:
         """The drawing as a data URI, the same bytes for the same figure; closes the figure."""
         from mpam_calib.report.embed import data_uri

@@ -229,7 +229,10 @@ def _identified_section(view: CalibrationView) -> Section:
             [Text("Every parameter became much narrower than its prior: the data determine them all.")],
         )
     table = learnt_table(view)
-    note = "“Learnt” is how much narrower than its prior a parameter became: 0 % is nothing, 100 % is everything."
+    note = (
+        "“Learnt” is how much narrower than its prior a parameter became: "
+        "0 % is nothing, 100 % is everything."
+    )
     caption = "Least identified first"
     return Section(
         "What the data could not identify",

@@ -5,22 +5,24 @@ from __future__ import annotations
 import math
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+LARGE, SMALL = 1e5, 1e-3
+"""Beyond these a number is written with a power of ten."""
 
 
 def decimals(uncertainty: float) -> int:
-    """Decimals that a value with this uncertainty deserves.
+    """Decimals that a value with this uncertainty deserves; negative: round to tens, hundreds, ...
 
-    Two digits of the uncertainty where it begins with 1 or 2, otherwise one (the Particle Data
-    Group's rule, simplified); never negative.
+    Two digits of the uncertainty where it begins with 1 or 2 or exceeds 10, otherwise one (after the
+    Particle Data Group's rule).
 
-    >>> decimals(0.55), decimals(0.12), decimals(14.0), decimals(0.0)
-    (1, 2, 0, 3)
+    >>> decimals(0.55), decimals(0.12), decimals(14.0), decimals(4100.0), decimals(0.0)
+    (1, 2, 0, -2, 3)
     """
     if not math.isfinite(uncertainty) or uncertainty <= 0:
         return 3
     exponent = math.floor(math.log10(uncertainty))
     leading = uncertainty / 10.0**exponent
-    return max(0, -exponent + (1 if leading < 3.0 else 0))
+    return -exponent + (1 if leading < 3.0 or exponent > 0 else 0)
 
 
 def with_band(mean: float, low: float, high: float) -> tuple[str, str]:
@@ -29,39 +31,56 @@ def with_band(mean: float, low: float, high: float) -> tuple[str, str]:
     >>> with_band(94.3214, 93.81, 94.9)
     ('94.3', '93.8–94.9')
     >>> with_band(-8.93e7, -9.9e7, -8.1e7)
-    ('−8.93×10⁷', '−9.90×10⁷ – −8.10×10⁷')
+    ('−8.9×10⁷', '−9.9 – −8.1 ×10⁷')
     """
-    if max(abs(mean), abs(low), abs(high)) >= 1e6:
-        return significant(mean), f"{significant(low)} – {significant(high)}"
-    n = decimals((high - low) / 2.0)
+    largest = max(abs(mean), abs(low), abs(high))
+    power = 0
+    if math.isfinite(largest) and largest > 0 and not SMALL <= largest < LARGE:
+        power = math.floor(math.log10(largest))
+    scale = 10.0**-power
+    n = decimals(scale * (high - low) / 2.0)
     joint = " – " if low < 0 else "–"
-    return fixed(mean, n), f"{fixed(low, n)}{joint}{fixed(high, n)}"
+    text, band = fixed(scale * mean, n), f"{fixed(scale * low, n)}{joint}{fixed(scale * high, n)}"
+    return (f"{text}{ten_to(power)}", f"{band} {ten_to(power)}") if power else (text, band)
+
+
+def ten_to(power: int) -> str:
+    """The factor as it is printed behind a number.
+
+    >>> ten_to(-4)
+    '×10⁻⁴'
+    """
+    return f"×10{superscript(power)}"
+
+
+def superscript(power: int) -> str:
+    """An integer as a superscript."""
+    return str(power).translate(_SUPERSCRIPTS)
 
 
 def fixed(value: float, n: int) -> str:
-    """The value with n decimals and a true minus sign; a negative zero loses its sign.
+    """The value with n decimals (negative: rounded to tens, ...), a true minus sign and no minus zero.
 
-    >>> fixed(-0.004, 2), fixed(-1.5, 1)
-    ('0.00', '−1.5')
+    >>> fixed(-0.004, 2), fixed(-1.5, 1), fixed(79929.0, -2)
+    ('0.00', '−1.5', '79900')
     """
     if not math.isfinite(value):
         return "–"
-    text = f"{value:.{n}f}"
+    text = f"{round(value, n):.{max(n, 0)}f}"
     return text.lstrip("-") if float(text) == 0 else text.replace("-", "−")
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """The value with so many significant digits; powers of ten beyond a million and below 1/1000.
+    """The value with so many significant digits.
 
-    >>> significant(0.073456), significant(123456.0), significant(-1.0822e8), significant(0.0)
-    ('0.0735', '123456', '−1.08×10⁸', '0')
+    >>> significant(0.073456), significant(89588.0, 2), significant(-1.0822e8), significant(0.0)
+    ('0.0735', '90000', '−1.08×10⁸', '0')
     """
     if not math.isfinite(value):
         return "–"
     if value == 0:
         return "0"
-    if 1e-3 <= abs(value) < 1e6:
-        exponent = math.floor(math.log10(abs(value)))
-        return fixed(value, max(0, digits - 1 - exponent))
+    if SMALL <= abs(value) < LARGE:
+        return fixed(value, digits - 1 - math.floor(math.log10(abs(value))))
     mantissa, power = f"{value:.{digits - 1}e}".split("e")
-    return f"{mantissa.replace('-', '−')}×10{str(int(power)).translate(_SUPERSCRIPTS)}"
+    return f"{mantissa.replace('-', '−')}{ten_to(int(power))}"

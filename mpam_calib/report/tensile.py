@@ -10,7 +10,7 @@ from markupsafe import Markup
 from mpam_calib.report import wording
 from mpam_calib.report.figures import residuals, strain_range
 from mpam_calib.report.figures import tensile as stress_strain
-from mpam_calib.report.numbers import significant, with_band
+from mpam_calib.report.numbers import with_band
 from mpam_calib.report.page import (
     Block,
     DataTable,
@@ -107,10 +107,6 @@ def range_table(frame: pd.DataFrame) -> pd.DataFrame:
         used = " (in use)" if row["used"] else ""
         column = f"{row['strain_low']:g} to {row['strain_high']:g}{used}"
         mean, q05, q95 = float(row["mean"]), float(row["q05"]), float(row["q95"])
-        text, band = with_band(mean, q05, q95) if max(map(abs, (q05, q95))) < 1e4 else _coarse(mean, q05, q95)
+        text, band = with_band(mean, q05, q95)
         rows.setdefault(label, {"quantity": label})[column] = f"{text} ({band})"
     return pd.DataFrame(list(rows.values()))
-
-
-def _coarse(mean: float, q05: float, q95: float) -> tuple[str, str]:
-    return significant(mean, 4), f"{significant(q05, 4)} – {significant(q95, 4)}"

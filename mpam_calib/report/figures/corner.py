@@ -8,6 +8,7 @@ import numpy as np
 
 from mpam_calib.report.figures import style
 from mpam_calib.report.figures.density import density, joint_density, mass_levels, spans
+from mpam_calib.report.figures.labels import axis_scale
 from mpam_calib.report.view import CalibrationView, Floats
 
 if TYPE_CHECKING:
@@ -15,27 +16,33 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MASSES = (0.5, 0.9)
+LEFT, BOTTOM, RIGHT, GAP = 0.85, 0.5, 0.1, 0.1
+"""Margins and the gap between panels, inches."""
 
 
 def draw(view: CalibrationView) -> Figure:
     """Lower triangle of pairs with the regions that hold 50 % and 90 %; densities on the diagonal."""
     names = [name for name in view.shown_parameters() if spans(view.draws[name])]
-    n = len(names)
-    size = style.WIDTH if n > 4 else 2.0 * n + 1.0
-    left, gap = 0.85 / size, 0.08 / size
-    cell = (1.0 - left - 0.1 / size) / max(n, 1)
-    with style.applied({"axes.grid": False, "axes.formatter.limits": (-3, 4)}):
-        figure = style.new_figure(size, width=size)
+    scales = [axis_scale(view, name) for name in names]
+    draws = [factor * view.draws[name] for name, (factor, _) in zip(names, scales, strict=True)]
+    labels = [label for _, label in scales]
+    n = max(len(names), 1)
+    width = style.WIDTH if n > 4 else 1.9 * n + LEFT + RIGHT
+    cell = (width - LEFT - RIGHT) / n
+    height = n * cell + BOTTOM + RIGHT
+    with style.applied({"axes.grid": False, "xtick.labelsize": 7, "ytick.labelsize": 7}):
+        figure = style.new_figure(height, width=width)
         figure.set_layout_engine("none")
-        for row in range(n):
+        for row in range(len(names)):
             for column in range(row + 1):
-                place = (left + column * cell, left + (n - 1 - row) * cell, cell - gap, cell - gap)
-                ax = figure.add_axes(place)
+                corner = ((LEFT + column * cell) / width, (BOTTOM + (n - 1 - row) * cell) / height)
+                ax = figure.add_axes((*corner, (cell - GAP) / width, (cell - GAP) / height))
                 if row == column:
-                    _diagonal(ax, view.draws[names[row]])
+                    _diagonal(ax, draws[row])
                 else:
-                    _pair(ax, view.draws[names[column]], view.draws[names[row]])
-                _frame(ax, view, names, row, column)
+                    _pair(ax, draws[column], draws[row])
+                ax.set_xlim(*_limits(draws[column]))
+                _frame(ax, labels, row, column, cell - GAP)
     return figure
 
 
@@ -72,29 +79,34 @@ def _limits(draws: Floats) -> tuple[float, float]:
     return float(low - room), float(high + room)
 
 
-def _frame(ax: Axes, view: CalibrationView, names: list[str], row: int, column: int) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    ax.set_xlim(*_limits(view.draws[names[column]]))
-    ax.xaxis.set_major_locator(MaxNLocator(2, prune="both"))
-    ax.yaxis.set_major_locator(MaxNLocator(2, prune="both"))
-    ax.tick_params(length=2, labelsize=7)
-    if row == len(names) - 1:
-        ax.set_xlabel(_label(view, names[column]), fontsize=8)
+def _frame(ax: Axes, labels: list[str], row: int, column: int, size: float) -> None:
+    """Ticks away from the corners, where neighbours' labels would meet; words on the outer sides only."""
+    ax.set_xticks(_inner_ticks(*ax.get_xlim()))
+    ax.tick_params(length=2)
+    if row == len(labels) - 1:
+        ax.set_xlabel(labels[column], fontsize=7.5)
     else:
         ax.tick_params(labelbottom=False)
     if row == column:
         ax.set_yticks([])
         ax.spines["left"].set_visible(False)
-    elif column == 0:
-        ax.set_ylabel(_label(view, names[row]), fontsize=8)
-        ax.yaxis.set_label_coords(-0.45, 0.5)
+        return
+    ax.set_yticks(_inner_ticks(*ax.get_ylim()))
+    if column == 0:
+        ax.set_ylabel(labels[row], fontsize=7.5)
+        ax.yaxis.set_label_coords(-0.56 / size, 0.5)
     else:
         ax.tick_params(labelleft=False)
-    ax.xaxis.get_offset_text().set_fontsize(6.5)
-    ax.yaxis.get_offset_text().set_fontsize(6.5)
 
 
-def _label(view: CalibrationView, name: str) -> str:
-    unit = view.unit_of(name)
-    return f"{name} ({unit})" if unit else name
+def _inner_ticks(low: float, high: float) -> list[float]:
+    from matplotlib.ticker import MaxNLocator
+
+    length = high - low
+    ticks: list[float] = []
+    for count in (2, 3, 4, 6):
+        found = MaxNLocator(count).tick_values(low, high)
+        ticks = [float(t) for t in found if low + 0.12 * length <= t <= high - 0.12 * length]
+        if len(ticks) >= 2 and ticks[-1] - ticks[0] >= 0.4 * length:
+            return [ticks[0], ticks[-1]]
+    return ticks[:1]

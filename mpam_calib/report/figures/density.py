@@ -37,7 +37,7 @@ def joint_density(x: Floats, y: Floats, bins: int = 36) -> tuple[Floats, Floats,
     """Smoothed histogram of pairs of draws: centres of x, centres of y, and density (bins y, bins x)."""
     ranges = [_range(x), _range(y)]
     counts, ex, ey = np.histogram2d(x, y, bins=bins, range=ranges)
-    taps = np.exp(-0.5 * (np.arange(-4, 5) / 1.5) ** 2)
+    taps = np.exp(-0.5 * (np.arange(-6, 7) / 1.9) ** 2)
     taps /= taps.sum()
     for axis in (0, 1):
         counts = np.apply_along_axis(np.convolve, axis, counts, taps, mode="same")

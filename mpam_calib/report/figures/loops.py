@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_PANELS = 9
-POINTS_ON_PAGE = 2000
+POINTS_IN_PANEL = 56
 
 
 def draw(view: CalibrationView) -> Figure:
@@ -30,13 +30,15 @@ def draw(view: CalibrationView) -> Figure:
         grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
         panels = list(grid.flat)
         for ax, level in zip(panels, levels, strict=False):
-            _panel(ax, view, level, readings[readings["level_kPa"] == level], POINTS_ON_PAGE // len(levels))
+            _panel(ax, view, level, readings[readings["level_kPa"] == level], POINTS_IN_PANEL)
         for ax in panels[len(levels) :]:
             style.blank(ax)
         for i, ax in enumerate(panels[: len(levels)]):
             if i + columns >= len(levels):
                 ax.set_xlabel("contraction (% of the length at rest)")
                 ax.tick_params(labelbottom=True)
+        moving = [b for b in ("loading", "unloading") if b in set(readings["branch"])]
+        _label_branches(panels[0], moving)
         for row in grid:
             row[0].set_ylabel("force (N)")
     return figure
@@ -65,12 +67,11 @@ def _panel(ax: Axes, view: CalibrationView, level: float, readings: pd.DataFrame
         mine = readings if branches == ["mean"] else readings[readings["branch"] == branch]
         kept = style.thinned(mine.sort_values("contraction", kind="stable"), points // len(branches))
         ax.plot(
-            100.0 * kept["contraction"], kept["force_N"], ".", color=colour, markersize=2.4, alpha=0.45,
-            markeredgewidth=0,
+            100.0 * kept["contraction"], kept["force_N"], "o", color=colour, markerfacecolor="white",
+            markersize=2.6, markeredgewidth=0.55,
         )  # fmt: skip
     ax.set_title(f"{level:g} kPa")
     ax.axhline(0.0, color=style.GREY, linewidth=0.7)
-    _label_branches(ax, bands, branches)
 
 
 def _nearest(bands: pd.DataFrame, level: float) -> pd.DataFrame:
@@ -89,19 +90,10 @@ def _branches(bands: pd.DataFrame, readings: pd.DataFrame) -> list[str]:
     return moving or ["mean"]
 
 
-def _label_branches(ax: Axes, bands: pd.DataFrame, branches: list[str]) -> None:
-    if branches == ["mean"] or not ax.get_subplotspec().is_first_col():  # type: ignore[union-attr]
-        return
-    if ax.get_subplotspec().rowspan.start > 0:  # type: ignore[union-attr]
-        return
-    # the outer branch's words stand above its curve, the inner one's below
-    for branch in branches:
-        rows = bands[bands["branch"] == branch]
-        above = branch == "loading"
-        row = rows.iloc[int(len(rows) * (0.38 if above else 0.22))]
-        ax.annotate(
-            branch, (100.0 * row["contraction"], row["q95"] if above else row["q05"]),
-            xytext=(5, 5) if above else (-6, -5), textcoords="offset points",
-            ha="left" if above else "right", va="bottom" if above else "top",
-            color=style.BRANCH_COLOURS[branch], fontsize=8.5,
+def _label_branches(ax: Axes, branches: list[str]) -> None:
+    """Branch names in their colours; force falls with contraction, so that corner is always free."""
+    for i, branch in enumerate(branches):
+        ax.text(
+            0.98, 0.97 - 0.10 * i, branch, transform=ax.transAxes, ha="right", va="top",
+            color=style.BRANCH_COLOURS[branch], fontweight="bold", fontsize=8.5,
         )  # fmt: skip

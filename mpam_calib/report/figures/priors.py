@@ -9,6 +9,7 @@ import numpy as np
 
 from mpam_calib.report.figures import style
 from mpam_calib.report.figures.density import density, spans
+from mpam_calib.report.figures.labels import axis_scale
 from mpam_calib.report.view import CalibrationView, Floats
 
 if TYPE_CHECKING:
@@ -25,9 +26,10 @@ def draw(view: CalibrationView) -> Figure:
         figure = style.new_figure(1.75 * rows + 0.15)
         panels = list(figure.subplots(rows, columns, squeeze=False).flat)
         for ax, name in zip(panels, names, strict=False):
-            _panel(ax, view.draws[name], view.prior_draws.get(name))
-            unit = view.unit_of(name)
-            ax.set_title(f"{name} ({unit})" if unit else name)
+            scale, label = axis_scale(view, name)
+            prior = view.prior_draws.get(name)
+            _panel(ax, scale * view.draws[name], None if prior is None else scale * prior)
+            ax.set_title(label)
         for ax in panels[len(names) :]:
             style.blank(ax)
     return figure

@@ -62,7 +62,7 @@ def _panel(
         colour = colours[float(level)]  # type: ignore[arg-type]
         kept = style.thinned(group.sort_values("contraction", kind="stable"), max(points // len(colours), 20))
         ax.plot(
-            scale * kept["contraction"], kept["residual"], ".", color=colour, markersize=2.2, alpha=0.30,
+            scale * kept["contraction"], kept["residual"], ".", color=colour, markersize=3.2, alpha=0.40,
             markeredgewidth=0,
         )  # fmt: skip
         x, y = binned(group["contraction"].to_numpy(float), group["residual"].to_numpy(float))

@@ -79,7 +79,7 @@ def level_colours(levels: Sequence[float]) -> dict[float, tuple[float, float, fl
     """A colour for each pressure level, dark to light with rising pressure."""
     import matplotlib as mpl
 
-    shades = np.linspace(0.05, 0.82, max(len(levels), 1))
+    shades = np.linspace(0.0, 0.7, max(len(levels), 1))
     return {level: mpl.colormaps["viridis"](shade) for level, shade in zip(levels, shades, strict=False)}
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from mpam_calib.report.figures import style
 from mpam_calib.report.view import CalibrationView
 
@@ -37,13 +35,9 @@ def draw(view: CalibrationView) -> Figure:
                 linewidth=0,
                 zorder=0,
             )
-            ax.text(
-                float(np.mean(strain[outside])),
-                ax.get_ylim()[1],
-                "outside the readings",
-                ha="center",
-                va="top",
-            )
+            edge, side = (strain[-1], "right") if outside[-1] else (strain[0], "left")
+            top = ax.get_ylim()[1]
+            ax.text(float(edge), top, "outside the readings", ha=side, va="top", color=style.INK)
         ax.set_xlabel("strain (elongation over the length at rest)")
         ax.set_ylabel("stress (kPa)")
     return figure
