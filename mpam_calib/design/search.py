@@ -1,0 +1,221 @@
+"""Hybrid search as in the thesis (3.3): an evolutionary global search, then SQP and interior point.
+
+The evolutionary algorithm is SciPy's differential evolution (it takes bounds, nonlinear constraints and
+integers), SQP is its SLSQP, interior point its trust-constr with a logarithmic barrier.
+"""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
+from scipy.optimize import Bounds, NonlinearConstraint
+
+from mpam_calib.design.gradient import gradient, in_box
+from mpam_calib.design.problem import Problem
+
+Array = NDArray[np.float64]
+Local = Literal["SQP", "IP"]
+
+# Through Any: the stubs know neither vectorised objectives nor constraints as dictionaries.
+_differential_evolution: Any = optimize.differential_evolution
+_minimize: Any = optimize.minimize
+
+POPULATION, GENERATIONS = 12, 60
+"""Individuals for each variable, and generations at most."""
+BARRIER = 1e-10
+"""Interior point ends when its logarithmic barrier weighs less than this (objective scaled to 1)."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What one method found: design (SI), objective (N), its iterations and objective evaluations.
+
+    ``history`` holds the objective (N) after every iteration.
+    """
+
+    method: str
+    x: Array
+    value: float
+    iterations: int
+    evaluations: int
+    history: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """A hybrid search: the global stage, the local stages that started from it, the best of them."""
+
+    problem: Problem
+    start: Stage
+    stages: tuple[Stage, ...]
+
+    @property
+    def best(self) -> Stage:
+        """The stage with the largest objective."""
+        return max((self.start, *self.stages), key=lambda s: s.value)
+
+    @property
+    def evaluations(self) -> int:
+        """Objective evaluations in all, those for gradients included."""
+        return self.start.evaluations + sum(s.evaluations for s in self.stages)
+
+
+class _Counted:
+    """The objective in the unit box, counting the designs it is asked for."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.count = 0
+        self._function = in_box(problem, problem.objective)
+
+    def __call__(self, u: Array) -> Array:
+        self.count += int(np.prod(u.shape[:-1]))
+        return self._function(u)
+
+
+def evolve(problem: Problem, seed: int, generations: int = GENERATIONS) -> Stage:
+    """Global search by differential evolution from a random population."""
+    objective = _Counted(problem)
+    history: list[float] = []
+    box = np.array([[0.0, 1.0]] * len(problem.variables))
+    integral = np.zeros(len(problem.variables), dtype=bool)
+    for i in problem.integers:
+        box[i] = problem.lower[i], problem.upper[i]
+        integral[i] = True
+
+    def scaled(v: Array) -> Array:
+        u = np.array(v.T)
+        for i in problem.integers:
+            u[..., i] = (u[..., i] - problem.lower[i]) / (problem.upper[i] - problem.lower[i])
+        return u
+
+    def record(intermediate_result: Any) -> None:
+        history.append(-float(intermediate_result.fun))
+
+    def constraint(v: Array) -> Array:
+        x = problem.unscaled(scaled(v))
+        return np.stack([c.value(x) for c in problem.constraints])
+
+    with warnings.catch_warnings():
+        # The population is drawn before the constraints are known; scipy warns while it is infeasible.
+        warnings.filterwarnings("ignore", category=UserWarning)
+        result = _differential_evolution(
+            lambda v: -objective(scaled(v)),
+            box,
+            popsize=POPULATION,
+            maxiter=generations,
+            tol=1e-7,
+            seed=np.random.default_rng(seed),
+            polish=False,
+            vectorized=True,
+            updating="deferred",
+            integrality=integral,
+            callback=record,
+            constraints=NonlinearConstraint(constraint, 0.0, np.inf),
+        )
+    x = problem.unscaled(scaled(np.asarray(result.x)[:, None])[0])
+    return Stage("GA", x, float(problem.objective(x)), int(result.nit), objective.count, tuple(history))
+
+
+def refine(problem: Problem, start: Array, method: Local) -> Stage:
+    """Local search from ``start`` (SI), integers relaxed, then fixed to their neighbours in turn."""
+    relaxed = _local(problem, start, method, {})
+    if not problem.integers:
+        return relaxed
+    choices = [
+        {float(np.floor(relaxed.x[i] + 1e-6)), float(np.ceil(relaxed.x[i] - 1e-6))} for i in problem.integers
+    ]
+    evaluations, best = relaxed.evaluations, None
+    for values in itertools.product(*choices):
+        stage = _local(problem, relaxed.x, method, dict(zip(problem.integers, values, strict=True)))
+        evaluations += stage.evaluations
+        if best is None or stage.value > best.value:
+            best = stage
+    assert best is not None
+    return replace(
+        best,
+        iterations=relaxed.iterations,
+        evaluations=evaluations,
+        history=relaxed.history,
+    )
+
+
+def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float]) -> Stage:
+    """One run of SQP or interior point in the unit box over the variables that are not fixed."""
+    objective = _Counted(problem)
+    base = problem.scaled(start)
+    for i, value in fixed.items():
+        base[i] = (value - problem.lower[i]) / (problem.upper[i] - problem.lower[i])
+    free = np.array([i for i in range(base.size) if i not in fixed])
+    size = max(abs(float(problem.objective(start))), 1e-6)
+    history: list[float] = []
+
+    def full(v: Array) -> Array:
+        u = np.broadcast_to(base, (*v.shape[:-1], base.size)).copy()
+        u[..., free] = v
+        return u
+
+    def f(v: Array) -> Array:
+        return -objective(full(v)) / size
+
+    def sqp_step(v: Array) -> None:
+        history.append(float(problem.objective(problem.unscaled(full(v)))))
+
+    def ip_step(v: Array, state: Any) -> bool:
+        sqp_step(v)
+        # Its own gradient test can stop it while the barrier still holds the design off its bounds.
+        return bool(state.barrier_parameter < BARRIER and state.optimality < 1e-8)
+
+    constraints = [(lambda v, c=c: c.value(problem.unscaled(full(v)))) for c in problem.constraints]
+    v0 = np.clip(base[free], 0.0, 1.0)
+    if method == "SQP":
+        result = _minimize(
+            lambda v: float(f(v)),
+            v0,
+            jac=lambda v: gradient(f, v),
+            method="SLSQP",
+            bounds=Bounds(0.0, 1.0),
+            constraints=[
+                {"type": "ineq", "fun": g, "jac": lambda v, g=g: gradient(g, v)} for g in constraints
+            ],
+            options={"ftol": 1e-13, "maxiter": 200},
+            callback=sqp_step,
+        )
+    else:
+        result = _minimize(
+            lambda v: float(f(v)),
+            # Interior point starts inside.
+            np.clip(v0, 0.02, 0.98),
+            jac=lambda v: gradient(f, v),
+            hess="2-point",
+            method="trust-constr",
+            bounds=Bounds(0.0, 1.0),
+            constraints=[
+                NonlinearConstraint(
+                    g, 0.0, np.inf, jac=lambda v, g=g: gradient(g, v)[None, :], hess="2-point"
+                )
+                for g in constraints
+            ],
+            options={"gtol": 1e-300, "xtol": 1e-300, "barrier_tol": BARRIER / 10.0, "maxiter": 500},
+            callback=ip_step,
+        )
+    x = problem.unscaled(full(np.clip(np.asarray(result.x), 0.0, 1.0)))
+    for i, value in fixed.items():
+        x[i] = value
+    return Stage(method, x, float(problem.objective(x)), int(result.nit), objective.count, tuple(history))
+
+
+def hybrid(
+    problem: Problem,
+    seed: int = 0,
+    local: tuple[Local, ...] = ("SQP", "IP"),
+    generations: int = GENERATIONS,
+) -> Optimum:
+    """Evolutionary search, then each local method from its result (thesis 3.3)."""
+    start = evolve(problem, seed, generations)
+    return Optimum(problem, start, tuple(refine(problem, start.x, method) for method in local))
