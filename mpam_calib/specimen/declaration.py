@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, field_validator, model_validator
 
 from mpam_calib.units import DEG, GPA, KPA, MM
 
@@ -21,12 +21,23 @@ Kinematics = Literal["inextensible_braid", "constant_thickness"]
 Strain = Literal["engineering", "stretch"]
 Friction = Literal["coulomb", "strand", "none"]
 Law = Literal["constant", "linear", "exponential", "exponential_each", "free"]
+FileKind = Literal["loops", "force_map", "blocked_force", "free_contraction", "tensile"]
+
+E_REL_SD = 0.1
+"""Relative 1-sigma of the factor common to declared moduli, where the file gives none."""
 
 
 class Table(BaseModel):
     """A TOML table: unknown keys are refused, values are not coerced from text."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Identity(Table):
+    """What the specimen is called and what its bladder is made of."""
+
+    name: Annotated[str, Field(min_length=1)]
+    bladder_material: str = ""
 
 
 class GeometrySd(Table):
@@ -112,13 +123,20 @@ class Simulation(Table):
     kinematics: Kinematics = "inextensible_braid"
     strain: Strain = "engineering"
     friction: Friction = "coulomb"
-    friction_by_pressure: bool = False
+    friction_by_pressure: StrictBool = False
     effects: tuple[str, ...] = ()
     moduli: str = "loops"
     order: Annotated[int, Field(ge=1, le=8, strict=True)] = 4
     law: Law = "linear"
-    E_Pa: tuple[Finite, ...] | None = None
+    E_Pa: Annotated[tuple[Finite, ...], Field(min_length=1, max_length=8)] | None = None
     E_rel_sd: NonNegative | None = None
+
+    @field_validator("moduli")
+    @classmethod
+    def _moduli_word(cls, value: str) -> str:
+        if value in ("loops", "tensile") or (value.startswith("run:") and value[4:].strip()):
+            return value
+        raise ValueError(f'"{value}"|one of "loops", "tensile", "run:PATH"')
 
 
 class Fit(Table):
@@ -126,10 +144,98 @@ class Fit(Table):
 
     tensile_strain: tuple[Finite, Finite] | None = None
 
+    @field_validator("tensile_strain")
+    @classmethod
+    def _rising(cls, value: tuple[float, float] | None) -> tuple[float, float] | None:
+        if value is not None and value[0] >= value[1]:
+            raise ValueError(f"[{value[0]:g}, {value[1]:g}]|the lower strain before the higher one")
+        return value
+
 
 class Csv(Table):
     """How the CSV files are written, where detection should not decide."""
 
-    delimiter: str | None = None
+    delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = None
     decimal: Literal[".", ","] | None = None
     skip_rows: Annotated[int, Field(ge=0, strict=True)] | None = None
+
+    @model_validator(mode="after")
+    def _marks_differ(self) -> Csv:
+        if self.delimiter is not None and self.delimiter == self.decimal:
+            raise ValueError(f'delimiter and decimal both "{self.decimal}"|two different characters')
+        return self
+
+
+class Column(Table):
+    """Where a column stands in a rig's own export: value = scale * cell + offset."""
+
+    name: Annotated[str, Field(min_length=1)] | None = None
+    scale: Finite = 1.0
+    offset: Finite = 0.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _plain_name(cls, value: object) -> object:
+        return {"name": value} if isinstance(value, str) else value
+
+    @field_validator("scale")
+    @classmethod
+    def _scale_is_not_zero(cls, value: float) -> float:
+        if value == 0.0:
+            raise ValueError("0|a factor other than zero")
+        return value
+
+
+Names = Annotated[str, Field(min_length=1)] | Annotated[tuple[str, ...], Field(min_length=1)]
+
+
+class Files(Table):
+    """The data files, each a name or a list of names (one file per pressure, say)."""
+
+    loops: Names | None = None
+    force_map: Names | None = None
+    blocked_force: Names | None = None
+    free_contraction: Names | None = None
+    tensile: Names | None = None
+
+    def of(self, kind: FileKind) -> tuple[str, ...]:
+        """Names of the files of one kind, in the order given."""
+        names = getattr(self, kind)
+        if names is None:
+            return ()
+        return (names,) if isinstance(names, str) else tuple(names)
+
+    @property
+    def muscle(self) -> tuple[str, ...]:
+        """Names of all files that record the muscle rather than its material."""
+        return (*self.of("loops"), *self.of("force_map"), *self.of("blocked_force"),
+                *self.of("free_contraction"))  # fmt: skip
+
+
+class Columns(Table):
+    """Maps from the package's column names to a rig's, for each kind of file."""
+
+    loops: dict[str, Column] = {}
+    force_map: dict[str, Column] = {}
+    blocked_force: dict[str, Column] = {}
+    free_contraction: dict[str, Column] = {}
+    tensile: dict[str, Column] = {}
+
+    def of(self, kind: FileKind) -> dict[str, Column]:
+        """The map of one kind of file."""
+        mapping: dict[str, Column] = getattr(self, kind)
+        return mapping
+
+
+class Declaration(Table):
+    """The whole of ``specimen.toml``."""
+
+    specimen: Identity
+    geometry: Geometry | None = None
+    braid: Braid | None = None
+    sensors: Sensors = Sensors()
+    files: Files = Files()
+    csv: Csv = Csv()
+    columns: Columns = Columns()
+    simulation: Simulation = Simulation()
+    fit: Fit = Fit()

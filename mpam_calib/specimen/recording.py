@@ -33,7 +33,8 @@ class Loops:
 
     ``stroke`` numbers the contiguous runs of one file, level, cycle and branch, from 0; ``clock``
     numbers the files, because each file has its own clock; ``averaged`` is how many consecutive
-    rows of a very large file each entry stands for (1 otherwise).
+    rows of a very large file each entry stands for (1 otherwise). ``temperature_C`` is there only
+    where every loops file has the column.
     """
 
     time_s: Floats
@@ -47,6 +48,7 @@ class Loops:
     clock: Ints
     censored: Bools
     averaged: int = 1
+    temperature_C: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,17 @@ class Tensile:
 
 
 @dataclass(frozen=True)
+class FileRead:
+    """One data file as it was found: its kind, name, data rows, and how it is written."""
+
+    kind: str
+    name: str
+    rows: int
+    delimiter: str
+    decimal: str
+
+
+@dataclass(frozen=True)
 class Specimen:
     """A specimen folder as read: what was declared and what was recorded.
 
@@ -112,6 +125,7 @@ class Specimen:
     tensile: Tensile | None
     digest: str
     notes: tuple[str, ...] = ()
+    files: tuple[FileRead, ...] = ()
 
     @property
     def has_muscle_data(self) -> bool:

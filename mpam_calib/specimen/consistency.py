@@ -1,0 +1,119 @@
+"""Whether the parts of a declaration fit each other and the data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mpam_calib.errors import InputError
+from mpam_calib.specimen.declaration import E_REL_SD, Declaration, Simulation
+from mpam_calib.specimen.toml_source import TomlSource
+from mpam_calib.specimen.validation import fault
+
+LEAST_LEVELS = {"linear": 2, "exponential": 3, "exponential_each": 3}
+"""Pressure levels that a law needs: two make a line; three tell an exponential from one."""
+
+
+def normalised_simulation(source: TomlSource, declaration: Declaration) -> Simulation:
+    """The simulation with what follows from its moduli filled in.
+
+    Declared ``E_Pa`` fix the order, the law (constant) and the strain (engineering). A tensile
+    test says nothing of pressure: its law is constant. Raises ``InputError`` where the moduli are
+    given twice or not at all, or an effect or friction lacks its braid.
+    """
+    simulation = declaration.simulation
+    tensile = bool(declaration.files.of("tensile"))
+    _check_moduli(source, simulation, tensile)
+    _check_braid(source, declaration)
+    if tensile and not declaration.files.muscle and declaration.geometry is None:
+        return simulation.model_copy(update={"moduli": "tensile", "law": "constant", "friction": "none"})
+    if simulation.moduli != "tensile":
+        return simulation
+    if simulation.E_Pa is None:
+        return simulation.model_copy(update={"law": "constant"})
+    sd = E_REL_SD if simulation.E_rel_sd is None else simulation.E_rel_sd
+    fixed = {"order": len(simulation.E_Pa), "law": "constant", "strain": "engineering", "E_rel_sd": sd}
+    return simulation.model_copy(update=fixed)
+
+
+def check_parts(source: TomlSource, declaration: Declaration, *, data_required: bool) -> None:
+    """Refuse a declaration without data, muscle data without a geometry, or a run that is not there."""
+    simulation = declaration.simulation
+    muscle = bool(declaration.files.muscle)
+    nothing = not muscle and not declaration.files.of("tensile")
+    if nothing and (data_required or simulation.E_Pa is None):
+        raise fault(source, ["files"], "no data files", 'at least one, such as loops = "loops.csv"')
+    if declaration.geometry is None and (muscle or nothing):
+        expected = "L0_mm, R0_mm, t0_mm and alpha0_deg of the muscle"
+        raise fault(source, ["geometry"], "no table [geometry]", expected)
+    if simulation.moduli.startswith("run:") and not material_run(source.file.parent, simulation).is_dir():
+        keys = ["simulation", "moduli"]
+        found = f'"{simulation.moduli}", which is not there'
+        raise fault(source, keys, found, "the folder of a finished run")
+    strain = declaration.fit.tensile_strain
+    if strain is not None and not declaration.files.of("tensile"):
+        keys = ["fit", "tensile_strain"]
+        raise fault(source, keys, "a strain range without a tensile file", "both or neither")
+
+
+def material_run(folder: Path, simulation: Simulation) -> Path:
+    """Folder of the run that ``moduli = "run:PATH"`` names, relative to the specimen's folder."""
+    return folder / simulation.moduli.removeprefix("run:").strip()
+
+
+def check_levels(source: TomlSource, simulation: Simulation, levels: int) -> None:
+    """Refuse a pressure law that the number of levels cannot carry."""
+    needed = LEAST_LEVELS.get(simulation.law, 1)
+    if simulation.moduli == "loops" and levels < needed:
+        found = f'law "{simulation.law}" with {levels} pressure level{"s" if levels > 1 else ""}'
+        expected = f'at least {needed} levels, or law = "constant"'
+        raise fault(source, ["simulation", "law"], found, expected)
+
+
+def least_parameters(simulation: Simulation, levels: int) -> int:
+    """The number of parameters that the muscle's rows have to tell, noise included."""
+    order = simulation.order
+    by_law = {
+        "constant": order,
+        "linear": 2 * order,
+        "exponential": 2 * order + 2,
+        "exponential_each": 4 * order,
+        "free": order * levels,
+    }
+    moduli = by_law[simulation.law] if simulation.moduli == "loops" else 0
+    friction = 0 if simulation.friction == "none" else 1
+    if simulation.friction_by_pressure:
+        friction *= levels
+    return moduli + friction + len(simulation.effects) + 1
+
+
+def check_rows(label: str, rows: int, parameters: int) -> None:
+    """Refuse fewer rows than parameters."""
+    if rows < parameters:
+        found = f"{rows} row{'s' if rows > 1 else ''} of data"
+        raise InputError(label, found, f"at least {parameters}, one for each parameter of the simulation")
+
+
+def _check_moduli(source: TomlSource, simulation: Simulation, tensile: bool) -> None:
+    keys = ["simulation", "E_Pa"]
+    if simulation.E_Pa is not None and tensile:
+        raise fault(source, keys, "both E_Pa and a tensile file", "one of them")
+    for name, value in (("E_Pa", simulation.E_Pa), ("E_rel_sd", simulation.E_rel_sd)):
+        if value is not None and simulation.moduli != "tensile":
+            keys = ["simulation", name]
+            found = f'{name} with moduli = "{simulation.moduli}"'
+            raise fault(source, keys, found, f'moduli = "tensile", or no {name}')
+    if simulation.moduli == "tensile" and simulation.E_Pa is None and not tensile:
+        keys = ["simulation", "moduli"]
+        raise fault(source, keys, '"tensile" without E_Pa and without a tensile file', "one of them")
+    if simulation.E_rel_sd is not None and simulation.E_Pa is None:
+        raise fault(source, ["simulation", "E_rel_sd"], "E_rel_sd without E_Pa", "both or neither")
+
+
+def _check_braid(source: TomlSource, declaration: Declaration) -> None:
+    simulation = declaration.simulation
+    users: list[str] = [name for name in ("braid_stretch", "strand_friction") if name in simulation.effects]
+    if simulation.friction == "strand":
+        users.append('friction = "strand"')
+    if users and declaration.braid is None:
+        keys = ["simulation", "effects" if "=" not in users[0] else "friction"]
+        raise fault(source, keys, f"{users[0]} without a [braid]", "E_br_GPa, nu_s, R_br_mm and n in [braid]")

@@ -1,0 +1,113 @@
+"""Pressure levels: which readings belong to one setting of the pressure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mpam_calib.specimen.motion import run_ids, run_starts
+from mpam_calib.specimen.recording import Floats, Ints
+from mpam_calib.units import KPA
+
+SAME_LEVEL_PA = 1.0 * KPA
+"""Levels of two kinds of file are one if they differ by less than this ..."""
+SAME_LEVEL_SHARE = 0.02
+"""... or by less than this share of the level."""
+LEAST_RUN = 5
+"""Fewer rows than this far from their stroke's level are noise, not a change of level."""
+SMALLEST_GAP_PA = 0.3 * KPA
+
+
+def gap_clusters(values: Floats, spread: float = 0.0, widest_share: float = 0.04) -> Ints:
+    """Label readings of pressure (Pa, shape (n,)) by level, from 0 upwards.
+
+    Sorted readings part where the gap is wide: above 1 % of the largest reading and three times
+    ``spread`` (their own scatter), at the most ``widest_share`` of the largest; in between the
+    largest jump in the sorted gaps decides, because gaps within a level are alike and small.
+    """
+    order = np.argsort(values, kind="stable")
+    gaps = np.diff(values[order])
+    top = float(np.abs(values).max())
+    low = max(SMALLEST_GAP_PA, 0.01 * top, 3.0 * spread)
+    high = max(low, widest_share * top)
+    between = np.sort(np.concatenate([[low], gaps[(gaps > low) & (gaps < high)], [high]]))
+    jump = int(np.argmax(np.diff(np.log(between))))
+    limit = float(np.sqrt(between[jump] * between[jump + 1]))
+    labels = np.zeros(len(values), dtype=np.int64)
+    labels[order] = np.concatenate([[0], np.cumsum(gaps > limit)])
+    return labels
+
+
+def static_levels(pressure: Floats) -> Ints:
+    """Levels of readings without a clock (Pa, shape (n,)), from 0 upwards.
+
+    A pressure swept without steps makes one endless cluster: such a one is cut into bins of 4 %
+    of the largest reading, so that a level stays a level.
+    """
+    labels = gap_clusters(pressure, widest_share=0.02)
+    widest = 0.05 * float(np.abs(pressure).max())
+    cut = np.zeros(len(pressure))
+    for label in np.unique(labels):
+        rows = labels == label
+        if np.ptp(pressure[rows]) > widest:
+            cut[rows] = np.floor((pressure[rows] - pressure[rows].min()) / (0.8 * widest))
+    return np.unique(labels * (cut.max() + 1.0) + cut, return_inverse=True)[1].astype(np.int64)
+
+
+def stroke_levels(pressure: Floats, units: Ints, steady: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Ints:
+    """Levels of loops recorded in time, shape (rows,), from 0 upwards.
+
+    ``pressure`` in Pa; ``units`` numbers the strokes (contiguous runs, from 0); ``steady`` is false
+    for rows whose pressure is being changed on purpose (pressurising, depressurising). The
+    strokes' medians are clustered; then runs of rows that are clearly at another level (a change
+    of pressure during a hold) are moved there.
+    """
+    starts = run_starts(units)
+    pieces = np.split(pressure, starts[1:])
+    medians = np.array([np.median(piece) for piece in pieces])
+    scatter = np.array([np.median(np.abs(piece - m)) for piece, m in zip(pieces, medians, strict=True)])
+    sizes = np.array([len(piece) for piece in pieces])
+    counts = steady[starts] & (sizes >= 0.05 * np.median(sizes))
+    if not counts.any():
+        return static_levels(pressure)
+    label = gap_clusters(medians[counts], spread=1.4826 * float(np.median(scatter[counts])))
+    centres = np.array([np.median(medians[counts][label == i]) for i in range(label.max() + 1)])
+    own = np.empty(len(starts), dtype=np.int64)
+    own[counts] = label
+    own[~counts] = _nearest(medians[~counts], centres)
+    return _moved(pressure, own[units], centres)
+
+
+def _nearest(values: Floats, centres: Floats) -> Ints:
+    return np.searchsorted((centres[1:] + centres[:-1]) / 2.0, values).astype(np.int64)
+
+
+def _moved(pressure: Floats, own: Ints, centres: Floats) -> Ints:
+    near = _nearest(pressure, centres)
+    runs = run_ids(near, own)
+    long = np.bincount(runs)[runs] >= LEAST_RUN
+    return np.where(long, near, own)
+
+
+def merge_levels(loops_Pa: Floats, map_Pa: Floats) -> tuple[Floats, Ints, Ints]:
+    """One sorted list of levels from those of loops and of a force map (Pa, each sorted).
+
+    Returns the levels and, for loops and for the map, the index of each old level in it. A map's
+    level near a loops level becomes that one and takes its pressure.
+    """
+    if not len(loops_Pa) or not len(map_Pa):
+        levels = np.concatenate([loops_Pa, map_Pa])
+        index = np.arange(len(levels), dtype=np.int64)
+        return levels, index[: len(loops_Pa)], index[: len(map_Pa)]
+    nearest = _nearest(map_Pa, loops_Pa)
+    tolerance = np.maximum(SAME_LEVEL_PA, SAME_LEVEL_SHARE * np.abs(loops_Pa[nearest]))
+    same = np.abs(map_Pa - loops_Pa[nearest]) <= tolerance
+    levels = np.sort(np.concatenate([loops_Pa, map_Pa[~same]]))
+    chosen = np.where(same, loops_Pa[nearest], map_Pa)
+    return levels, np.searchsorted(levels, loops_Pa), np.searchsorted(levels, chosen)
+
+
+def medians_by_label(values: Floats, labels: Ints) -> Floats:
+    """Median of ``values`` for each label 0, 1, ... (labels without rows are left out by the caller)."""
+    order = np.argsort(labels, kind="stable")
+    pieces = np.split(values[order], run_starts(labels[order])[1:])
+    return np.array([np.median(piece) for piece in pieces])

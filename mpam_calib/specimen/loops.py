@@ -1,0 +1,175 @@
+"""Reading force-displacement loops: one or several files, each with its own clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from mpam_calib.errors import InputError
+from mpam_calib.specimen.declaration import Geometry
+from mpam_calib.specimen.levels import medians_by_label, stroke_levels
+from mpam_calib.specimen.motion import (
+    detect_branch,
+    noise_sd,
+    number_cycles,
+    run_ids,
+    run_starts,
+    turn_threshold,
+)
+from mpam_calib.specimen.plausibility import check_displacement, check_force, check_pressure
+from mpam_calib.specimen.recording import DEPRESSURISING, PRESSURISING, Bools, Floats, Ints, Loops
+from mpam_calib.specimen.reduction import average_rows, rows_per_mean
+from mpam_calib.specimen.source import DataFile
+from mpam_calib.specimen.wording import listed
+from mpam_calib.units import KPA, MM
+
+
+@dataclass(frozen=True)
+class LoopsRead:
+    """Loops whose ``level`` indexes their own ``levels_Pa``, and what the reader did to them."""
+
+    loops: Loops
+    levels_Pa: Floats
+    rows: tuple[int, ...]
+    notes: tuple[str, ...]
+
+
+def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | None) -> LoopsRead:
+    """Read the loops files in the order given and sort out levels, branches, cycles and strokes.
+
+    Raises ``InputError`` for anything in a file that cannot be used.
+    """
+    averaged = rows_per_mean(sum(file.estimated_rows for file in files))
+    frames, counts = [], []
+    for file in files:
+        frame, count = _read_file(file, averaged, floor_N)
+        _check_plausible(file, frame, geometry)
+        frames.append(frame)
+        counts.append(count)
+    clock = np.repeat(np.arange(len(frames)), [len(frame) for frame in frames])
+    everywhere = set.intersection(*(set(frame.columns) for frame in frames))
+    notes = []
+    if averaged > 1:
+        notes.append(f"loops: {sum(counts)} rows were averaged {averaged} at a time while reading")
+    for name in ("setpoint_kPa", "cycle"):
+        without = [file.label for file, frame in zip(files, frames, strict=True) if name not in frame]
+        if without and len(without) < len(files):
+            notes.append(f"loops: {name} is not in {listed(without, 3)} and was not used in the others")
+    level, branch = _levels_and_branches(frames, clock, "setpoint_kPa" in everywhere)
+    rows = pd.concat([frame[sorted(everywhere)] for frame in frames], ignore_index=True)
+    pressure = rows["pressure_kPa"].to_numpy() * KPA
+    level, levels_Pa = _sorted_levels(pressure, level)
+    _check_levels(files, frames, clock, level, levels_Pa)
+    if "cycle" in everywhere:
+        cycle = rows["cycle"].to_numpy().astype(np.int64)
+    else:
+        cycle = number_cycles(level, clock, branch)
+    loops = Loops(
+        time_s=rows["time_s"].to_numpy(),
+        pressure_Pa=pressure,
+        displacement_m=rows["displacement_mm"].to_numpy() * MM,
+        force_N=rows["force_N"].to_numpy(),
+        level=level,
+        cycle=cycle,
+        branch=branch,
+        stroke=run_ids(clock, level, cycle, branch),
+        clock=clock,
+        censored=rows["censored"].to_numpy() > 0.5,
+        averaged=averaged,
+        temperature_C=rows["temperature_C"].to_numpy() if "temperature_C" in everywhere else None,
+    )
+    return LoopsRead(loops, levels_Pa, tuple(counts), tuple(notes))
+
+
+def _read_file(file: DataFile, averaged: int, floor_N: float | None) -> tuple[pd.DataFrame, int]:
+    """The rows of a file (averaged where it is very large) with a ``censored`` column, and their number."""
+    kept: list[pd.DataFrame] = []
+    count = 0
+    last_time = -np.inf
+    for block in file.blocks():
+        time = block["time_s"].to_numpy()
+        step = np.diff(time, prepend=last_time)
+        if (step <= 0.0).any():
+            first = int(np.flatnonzero(step <= 0.0)[0])
+            before = time[first - 1] if first else last_time
+            kind = "the time of the row before again" if step[first] == 0.0 else "a step back in time"
+            raise InputError(
+                file.label,
+                f"{time[first]:.10g} after {before:.10g} ({kind})",
+                "a time later than the row before's (a list in [files] where each has its own clock)",
+                int(block.index[first]),
+                "time_s",
+            )
+        last_time = float(time[-1])
+        count += len(block)
+        censored = censored_rows(block, floor_N)
+        if averaged > 1:
+            block, censored = average_rows(block, averaged, censored)
+        kept.append(block.assign(censored=censored.astype(float)))
+    return pd.concat(kept), count
+
+
+def censored_rows(frame: pd.DataFrame, floor_N: float | None) -> Bools:
+    """Rows that say "slack": flagged in ``censored``, or reading at or below the floor."""
+    censored = np.zeros(len(frame), dtype=bool)
+    if "censored" in frame:
+        censored |= frame["censored"].to_numpy() == 1.0
+    if floor_N is not None:
+        censored |= frame["force_N"].to_numpy() <= floor_N
+    return censored
+
+
+def _check_plausible(file: DataFile, frame: pd.DataFrame, geometry: Geometry) -> None:
+    held = "branch" in frame and bool(frame["branch"].isin([PRESSURISING, DEPRESSURISING]).any())
+    rows = frame.index.to_numpy()
+    check_displacement(file.label, frame["displacement_mm"].to_numpy() * MM, rows, geometry, held=held)
+    check_force(file.label, "loops", frame["force_N"].to_numpy())
+
+
+def _levels_and_branches(frames: Sequence[pd.DataFrame], clock: Ints, setpoints: bool) -> tuple[Ints, Ints]:
+    """Level (in any order) and branch of every row.
+
+    Strokes tell the levels, and a level's own rows tell its strokes: a jump of the crosshead
+    between two levels is no stroke. So the motion is looked at twice.
+    """
+    rough = np.concatenate([_branches(frame, np.zeros(len(frame), dtype=np.int64)) for frame in frames])
+    if setpoints:
+        values = np.concatenate([frame["setpoint_kPa"].to_numpy() for frame in frames])
+        level = np.unique(np.round(values, 6), return_inverse=True)[1].astype(np.int64)
+    else:
+        pressure = np.concatenate([frame["pressure_kPa"].to_numpy() for frame in frames]) * KPA
+        steady = ~np.isin(rough, [PRESSURISING, DEPRESSURISING])
+        level = stroke_levels(pressure, run_ids(clock, rough), steady)
+    ends = np.cumsum([len(frame) for frame in frames])[:-1]
+    parts = zip(frames, np.split(level, ends), strict=True)
+    return level, np.concatenate([_branches(frame, run_ids(part)) for frame, part in parts])
+
+
+def _branches(frame: pd.DataFrame, runs: Ints) -> Ints:
+    """Branch codes as the file gives them, else from the motion within each run."""
+    if "branch" in frame:
+        return frame["branch"].to_numpy().astype(np.int64)
+    displacement = frame["displacement_mm"].to_numpy()
+    threshold, sd = turn_threshold(displacement), noise_sd(displacement)
+    pieces = np.split(displacement, run_starts(runs)[1:])
+    return np.concatenate([detect_branch(piece, threshold, sd) for piece in pieces])
+
+
+def _sorted_levels(pressure: Floats, level: Ints) -> tuple[Ints, Floats]:
+    """Levels numbered by rising median pressure, and these medians (Pa)."""
+    level = np.unique(level, return_inverse=True)[1].astype(np.int64)
+    medians = medians_by_label(pressure, level)
+    order = np.argsort(medians, kind="stable")
+    return np.argsort(order, kind="stable").astype(np.int64)[level], medians[order]
+
+
+def _check_levels(
+    files: Sequence[DataFile], frames: Sequence[pd.DataFrame], clock: Ints, level: Ints, levels_Pa: Floats
+) -> None:
+    rows = np.concatenate([frame.index.to_numpy() for frame in frames])
+    for i in range(len(files)):
+        here = clock == i
+        check_pressure(files[i].label, "loops", levels_Pa[level[here]], rows[here])

@@ -1,0 +1,82 @@
+"""Values that can be read but cannot be meant: other units, flipped signs, a crosshead that rests."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mpam_calib.errors import InputError
+from mpam_calib.specimen.declaration import FileKind, Geometry
+from mpam_calib.specimen.motion import turn_threshold, turning_points
+from mpam_calib.specimen.recording import Floats, Ints
+from mpam_calib.units import KPA, MM
+
+HIGHEST_LEVEL_KPA = 5000.0
+LEAST_STROKE = 0.005
+"""Smaller largest displacements, as a share of L0, are taken for metres."""
+
+
+def map_hint(kind: FileKind, column: str, scale: str) -> str:
+    """How to map a column whose unit or sign differs."""
+    return f'else map it: [columns.{kind}] {column} = {{ name = "...", scale = {scale} }}'
+
+
+def check_pressure(label: str, kind: FileKind, pressure_Pa: Floats, rows: Ints) -> None:
+    """Refuse a level above 5,000 kPa; ``rows`` are the editor's numbers of the readings."""
+    high = np.flatnonzero(pressure_Pa > HIGHEST_LEVEL_KPA * KPA)
+    if len(high):
+        found = f"a pressure level of {pressure_Pa[high[0]] / KPA:g} kPa (pascals?)"
+        expected = f"at most {HIGHEST_LEVEL_KPA:g}; {map_hint(kind, 'pressure_kPa', '0.001')}"
+        raise InputError(label, found, expected, int(rows[high[0]]), "pressure_kPa")
+
+
+def check_force(label: str, kind: FileKind, force_N: Floats) -> None:
+    """Refuse forces of which most are negative."""
+    median = float(np.median(force_N))
+    if median < 0.0:
+        found = f"a median force of {median:.3g} N (flipped sign?)"
+        expected = f"pulling forces above 0; {map_hint(kind, 'force_N', '-1.0')}"
+        raise InputError(label, found, expected, None, "force_N")
+
+
+def check_displacement(
+    label: str, displacement_m: Floats, rows: Ints, geometry: Geometry, *, held: bool
+) -> None:
+    """Refuse a displacement that never moves (unless ``held`` on purpose), is in metres or impossible."""
+    column = "displacement_mm"
+    millimetres = displacement_m / MM
+    if not held:
+        if len(turning_points(displacement_m, turn_threshold(displacement_m))) < 2:
+            found = f"a displacement that never moves ({millimetres[0]:g} throughout)"
+            expected = "loops over length, or branch pressurising/depressurising at held length"
+            raise InputError(label, found, expected, None, column)
+        largest = float(np.abs(millimetres).max())
+        if largest < LEAST_STROKE * geometry.L0_mm:
+            found = f"a largest displacement of {largest:.3g} mm (metres?)"
+            hint = map_hint("loops", column, "1000.0")
+            expected = f"at least {LEAST_STROKE:g} of L0 = {geometry.L0_mm:g} mm; {hint}"
+            raise InputError(label, found, expected, None, column)
+    check_contraction(label, displacement_m / geometry.L0, rows, geometry, "loops", column)
+
+
+def longest_contraction(geometry: Geometry) -> float:
+    """The (negative) contraction at which the strands are straight: no braid is longer."""
+    return 1.0 - 1.0 / math.sin(geometry.alpha0)
+
+
+def check_contraction(
+    label: str, contraction: Floats, rows: Ints, geometry: Geometry, kind: FileKind, column: str
+) -> None:
+    """Refuse a muscle shorter than nothing, or one that is mostly longer than its straight strands."""
+    unit, factor = (" mm", geometry.L0_mm) if column == "displacement_mm" else ("", 1.0)
+    short = np.flatnonzero(contraction >= 1.0)
+    if len(short):
+        found = f"{contraction[short[0]] * factor:.4g}{unit}"
+        expected = f"a shortening below L0 = {geometry.L0_mm:g} mm (not a length)"
+        raise InputError(label, found, expected, int(rows[short[0]]), column)
+    median = float(np.median(contraction))
+    if median <= longest_contraction(geometry):
+        found = f"a median of {median * factor:.4g}{unit}, longer than the strands (flipped sign?)"
+        expected = f"contraction above 0; {map_hint(kind, column, '-1.0')}"
+        raise InputError(label, found, expected, None, column)

@@ -1,0 +1,133 @@
+"""Reading a specimen folder: declaration, files, levels, digest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from mpam_calib.specimen.consistency import (
+    check_levels,
+    check_parts,
+    check_rows,
+    least_parameters,
+    material_run,
+    normalised_simulation,
+)
+from mpam_calib.specimen.declaration import Declaration, FileKind
+from mpam_calib.specimen.levels import medians_by_label, merge_levels, static_levels
+from mpam_calib.specimen.loops import LoopsRead, read_loops
+from mpam_calib.specimen.recording import BlockedForce, FileRead, Floats, FreeContraction, Specimen
+from mpam_calib.specimen.source import DataFile, data_files, digest
+from mpam_calib.specimen.static_files import (
+    ForceMapRead,
+    read_blocked_force,
+    read_force_map,
+    read_free_contraction,
+    read_tensile,
+)
+from mpam_calib.specimen.toml_source import TomlSource, read_toml
+from mpam_calib.specimen.validation import validate
+
+
+def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
+    """See :func:`mpam_calib.specimen.read`."""
+    source = read_toml(path)
+    declaration = validate(source)
+    simulation = normalised_simulation(source, declaration)
+    check_parts(source, declaration, data_required=data_required)
+    files = data_files(source, declaration)
+    floor = declaration.sensors.force_floor_N
+    geometry = declaration.geometry
+    rows: dict[FileKind, tuple[int, ...]] = {}
+
+    def of(kind: FileKind) -> list[DataFile]:
+        return [file for file in files if file.kind == kind]
+
+    loops = force_map = blocked = free = tensile = None
+    if geometry is not None:
+        if of("loops"):
+            loops = read_loops(of("loops"), geometry, floor)
+            rows["loops"] = loops.rows
+        if of("force_map"):
+            force_map = read_force_map(of("force_map"), geometry, floor)
+            rows["force_map"] = force_map.rows
+        if of("blocked_force"):
+            blocked, rows["blocked_force"] = read_blocked_force(of("blocked_force"), geometry, floor)
+        if of("free_contraction"):
+            free, rows["free_contraction"] = read_free_contraction(of("free_contraction"), geometry)
+    if of("tensile"):
+        tensile, rows["tensile"] = read_tensile(of("tensile"))
+        in_range = _rows_in_range(tensile.strain, declaration.fit.tensile_strain)
+        check_rows(of("tensile")[0].label, in_range, simulation.order + 1)
+
+    levels_Pa, loops, force_map = _common_levels(loops, force_map, blocked, free)
+    muscle_rows = sum(sum(counts) for kind, counts in rows.items() if kind != "tensile")
+    if muscle_rows:
+        check_levels(source, simulation, len(levels_Pa))
+        first = next(file for file in files if file.kind != "tensile")
+        check_rows(first.label, muscle_rows, least_parameters(simulation, len(levels_Pa)))
+    return Specimen(
+        name=declaration.specimen.name,
+        bladder_material=declaration.specimen.bladder_material,
+        folder=source.file.parent,
+        geometry=geometry,
+        braid=declaration.braid,
+        sensors=declaration.sensors,
+        simulation=simulation,
+        fit=declaration.fit,
+        csv=declaration.csv,
+        levels_Pa=levels_Pa,
+        loops=loops.loops if loops else None,
+        force_map=force_map.force_map if force_map else None,
+        blocked_force=blocked,
+        free_contraction=free,
+        tensile=tensile,
+        digest=_digest(source, declaration, files),
+        notes=loops.notes if loops else (),
+        files=tuple(
+            FileRead(file.kind, file.name, count, file.form.delimiter, file.form.decimal)
+            for kind, counts in rows.items()
+            for file, count in zip(of(kind), counts, strict=True)
+        ),
+    )
+
+
+def _common_levels(
+    loops: LoopsRead | None,
+    force_map: ForceMapRead | None,
+    blocked: BlockedForce | None,
+    free: FreeContraction | None,
+) -> tuple[Floats, LoopsRead | None, ForceMapRead | None]:
+    """One list of levels (Pa, sorted), and the recordings with ``level`` indexing it."""
+    if loops is None and force_map is None:
+        pressures = [part.pressure_Pa for part in (blocked, free) if part is not None]
+        if not pressures:
+            return np.zeros(0), None, None
+        together = np.concatenate(pressures)
+        return medians_by_label(together, static_levels(together)), None, None
+    nothing = np.zeros(0)
+    levels, loop_index, map_index = merge_levels(
+        nothing if loops is None else loops.levels_Pa, nothing if force_map is None else force_map.levels_Pa
+    )
+    if loops is not None:
+        loops = replace(loops, loops=replace(loops.loops, level=loop_index[loops.loops.level]))
+    if force_map is not None:
+        moved = replace(force_map.force_map, level=map_index[force_map.force_map.level])
+        force_map = replace(force_map, force_map=moved)
+    return levels, loops, force_map
+
+
+def _rows_in_range(strain: Floats, limits: tuple[float, float] | None) -> int:
+    low, high = limits if limits is not None else (-np.inf, np.inf)
+    return int(np.count_nonzero((strain >= low) & (strain <= high)))
+
+
+def _digest(source: TomlSource, declaration: Declaration, files: list[DataFile]) -> str:
+    paths = [file.path for file in files]
+    if declaration.simulation.moduli.startswith("run:"):
+        # Another posterior of the material is another model of the muscle.
+        record = material_run(source.file.parent, declaration.simulation) / "run.json"
+        paths += [record] if record.is_file() else []
+    return digest(source.tables, paths)

@@ -1,0 +1,69 @@
+"""Averaging the rows of a very large recording while it is read."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from mpam_calib.specimen.motion import detect_branch, noise_sd, turn_threshold
+from mpam_calib.specimen.recording import Bools, Floats
+
+ROWS_KEPT = 250_000
+"""Loops of more rows than about this are averaged: 100 Hz for 40 minutes are kept as they are."""
+
+_LABELS = ("setpoint_kPa", "cycle", "branch")
+
+
+def rows_per_mean(rows: float) -> int:
+    """How many consecutive rows to average so that about ``ROWS_KEPT`` remain."""
+    return max(1, int(np.ceil(rows / ROWS_KEPT)))
+
+
+def average_rows(frame: pd.DataFrame, rows: int, censored: Bools) -> tuple[pd.DataFrame, Bools]:
+    """Means of ``rows`` consecutive rows of a block, and whether at least half of each is censored.
+
+    A group never spans a change of setpoint, cycle or branch, a turn of the crosshead, a gap
+    in time or a step of the pressure; its index is the editor's number of its first row.
+    """
+    cuts = _cuts(frame)
+    run_start = np.flatnonzero(cuts)
+    run = np.cumsum(cuts) - 1
+    within = np.arange(len(frame)) - run_start[run]
+    length = np.diff(np.append(run_start, len(frame)))
+    # Equal groups inside each run, rather than full ones and a small remainder.
+    groups = np.maximum(1, np.round(length / rows)).astype(np.int64)
+    part = within * groups[run] // length[run]
+    starts = np.flatnonzero(cuts | (np.diff(part, prepend=0) != 0))
+    sizes = np.diff(np.append(starts, len(frame)))
+    means = {
+        name: np.add.reduceat(frame[name].to_numpy(dtype=float), starts) / sizes
+        for name in frame.columns
+        if name not in _LABELS
+    }
+    means |= {name: frame[name].to_numpy()[starts] for name in _LABELS if name in frame}
+    share = np.add.reduceat(censored.astype(float), starts) / sizes
+    return pd.DataFrame(means, index=frame.index[starts]), share >= 0.5
+
+
+def _cuts(frame: pd.DataFrame) -> Bools:
+    """Whether a group must begin at each row."""
+    cuts = np.zeros(len(frame), dtype=bool)
+    cuts[0] = True
+    for name in _LABELS:
+        if name in frame:
+            cuts[1:] |= np.diff(frame[name].to_numpy()) != 0
+    time = np.diff(frame["time_s"].to_numpy())
+    cuts[1:] |= time > 5.0 * np.median(time) if len(time) else False
+    cuts[1:] |= _steps(frame["pressure_kPa"].to_numpy())
+    displacement = frame["displacement_mm"].to_numpy()
+    cuts[1:] |= _steps(displacement)
+    branch = detect_branch(displacement, turn_threshold(displacement), noise_sd(displacement))
+    cuts[1:] |= np.diff(branch) != 0
+    return cuts
+
+
+def _steps(values: Floats) -> Bools:
+    """Whether each step between rows is a jump: far above the noise and a visible part of the range."""
+    step = np.abs(np.diff(values))
+    jump: Bools = step > max(12.0 * noise_sd(values), 0.03 * float(np.ptp(values)))
+    return jump
