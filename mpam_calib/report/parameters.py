@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from mpam_calib.report.glossary import meaning
-from mpam_calib.report.numbers import significant, with_band
+from mpam_calib.report.numbers import fixed, significant, with_band
 from mpam_calib.report.trust import UNIDENTIFIED
 from mpam_calib.report.view import CalibrationView
 
@@ -35,9 +35,9 @@ def summary_table(view: CalibrationView, names: list[str] | None = None) -> pd.D
                 "90 % band": band,
                 "sd": significant(float(row["sd"]), 2),
                 "prior sd": significant(float(row["prior_sd"]), 2),
-                "R-hat": f"{row['rhat']:.3f}",
-                "ESS bulk": f"{row['ess_bulk']:.0f}",
-                "ESS tail": f"{row['ess_tail']:.0f}",
+                "R-hat": fixed(float(row["rhat"]), 3),
+                "ESS bulk": fixed(float(row["ess_bulk"]), 0),
+                "ESS tail": fixed(float(row["ess_tail"]), 0),
             }
         )
     return pd.DataFrame(rows)

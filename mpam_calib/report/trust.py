@@ -57,9 +57,8 @@ def convergence(view: CalibrationView) -> Limit | None:
         failed.append(
             f"independent starts disagree on {c.rhat_parameter} (R-hat {c.rhat_max:.3f}, limit {RHAT_LIMIT})"
         )
-    ess = min(c.ess_bulk_min, c.ess_tail_min)
-    if not ess >= ESS_LIMIT:
-        failed.append(f"the draws are worth only {ess:.0f} independent ones ({ESS_LIMIT:.0f} wanted)")
+    if not c.ess_min >= ESS_LIMIT:
+        failed.append(f"the draws are worth only {c.ess_min:.0f} independent ones ({ESS_LIMIT:.0f} wanted)")
     if failed or not c.converged:
         why = "; ".join(failed) or "it was stopped by its step budget"
         sentence = (
@@ -97,7 +96,7 @@ def band_width(view: CalibrationView) -> Limit | None:
     worst, words = 0.0, ""
     for name, mean, low, high in headline_bands(view):
         half = (high - low) / 2.0
-        relative = half / abs(mean) if mean else math.inf
+        relative = half / abs(mean) if mean else math.inf if half else 0.0
         if relative > worst:
             worst, words = relative, f"the {name} is known to ± {100 * relative:.0f} % only"
     if worst <= WIDE_CAUTION:

@@ -53,6 +53,11 @@ class Convergence:
     acceptance: float = float("nan")
     modes: int = 1
 
+    @property
+    def ess_min(self) -> float:
+        """The smaller of bulk and tail ESS; nan if either is."""
+        return float(np.min([self.ess_bulk_min, self.ess_tail_min]))
+
 
 @dataclass(frozen=True)
 class CalibrationView:
@@ -105,8 +110,8 @@ class CalibrationView:
 
     @property
     def top_level_kPa(self) -> float:
-        """The highest pressure level, kPa."""
-        return float(max(self.levels_kPa))
+        """The highest pressure level, kPa (of the bands, if the data have no levels)."""
+        return float(max(self.levels_kPa, default=self.bands["pressure_kPa"].max()))
 
     def shown_parameters(self) -> list[str]:
         """The headline parameters that have draws to show, at most eight."""

@@ -29,7 +29,8 @@ _LAW = {
 
 def simulation_sentence(simulation: Simulation) -> str:
     """The declared simulation of a muscle in one sentence."""
-    per_level = ", one value per level" if simulation.friction_by_pressure else ""
+    each = simulation.friction_by_pressure and simulation.friction != "none"
+    per_level = ", one value per level" if each else ""
     if simulation.moduli == "tensile":
         moduli = "the bladder's stiffness comes from a tensile test"
     elif simulation.moduli.startswith("run:"):
@@ -53,7 +54,7 @@ def material_sentence(simulation: Simulation) -> str:
 
 def convergence_sentences(c: Convergence) -> str:
     """Whether the sampler settled, for a reader who has never run one; paragraphs."""
-    ess = min(c.ess_bulk_min, c.ess_tail_min)
+    ess = c.ess_min
     settled = (
         "Yes."
         if c.converged and c.rhat_max <= RHAT_LIMIT and ess >= ESS_LIMIT

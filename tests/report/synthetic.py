@@ -19,18 +19,48 @@ def curve(pressure: float, contraction: np.ndarray) -> np.ndarray:
     return 0.39 * (pressure - 9) * ((1 - contraction) ** 2 - (1 - free) ** 2) / (1 - (1 - free) ** 2)
 
 
-def band_rows(quantity: str, pressure: float, contraction: Any, branch: str, mean: Any, sd: Any) -> pd.DataFrame:
+def band_rows(
+    quantity: str, pressure: float, contraction: Any, branch: str, mean: Any, sd: Any
+) -> pd.DataFrame:
     frame = {"quantity": quantity, "pressure_kPa": pressure, "contraction": contraction, "branch": branch}
     frame |= {"mean": mean, **{q: mean + z * sd for q, z in Z.items()}, "extrapolated": False}
     return pd.DataFrame(frame, index=range(np.size(mean)))
 
 
-def summary_of(draws: dict[str, np.ndarray], priors: dict[str, np.ndarray], units: dict[str, str]) -> pd.DataFrame:
+def summary_of(
+    draws: dict[str, np.ndarray], priors: dict[str, np.ndarray], units: dict[str, str]
+) -> pd.DataFrame:
     rows = []
     for name, x in draws.items():
         q05, q50, q95 = np.quantile(x, [0.05, 0.5, 0.95])
-        rows.append((name, units.get(name, ""), x.mean(), x.std(), q05, q50, q95, priors[name].std(), 1.003, 2100, 1800))
-    columns = "parameter,unit,mean,sd,q05,q50,q95,prior_sd,rhat,ess_bulk,ess_tail".split(",")
+        rows.append(
+            (
+                name,
+                units.get(name, ""),
+                x.mean(),
+                x.std(),
+                q05,
+                q50,
+                q95,
+                priors[name].std(),
+                1.003,
+                2100,
+                1800,
+            )
+        )
+    columns = [
+        "parameter",
+        "unit",
+        "mean",
+        "sd",
+        "q05",
+        "q50",
+        "q95",
+        "prior_sd",
+        "rhat",
+        "ess_bulk",
+        "ess_tail",
+    ]
     return pd.DataFrame(rows, columns=columns)
 
 
@@ -66,15 +96,17 @@ def muscle(rows_per_branch: int = 240, n_draws: int = 2000, **changes: Any) -> C
             observed.append(
                 pd.DataFrame(
                     {
-                        "kind": "loops", "level_kPa": P, "pressure_kPa": P, "contraction": x, "branch": branch,
-                        "force_N": reading, "fitted_N": fitted, "sd_N": 0.5, "cycle": 1,
+                        "kind": "loops", "level_kPa": P, "pressure_kPa": P, "contraction": x,
+                        "branch": branch, "force_N": reading, "fitted_N": fitted, "sd_N": 0.5, "cycle": 1,
                         "stroke": 2 * number + (s > 0), "time_s": np.arange(len(x)) * 0.1, "censored": False,
                     }
                 )
             )  # fmt: skip
         bands.append(band_rows("blocked_force_N", P, 0.0, "mean", curve(P, np.zeros(1)), 0.3 + 0.004 * P))
         bands.append(band_rows("free_contraction", P, np.nan, "mean", np.array([free]), 0.002))
-    points = pd.DataFrame({"kind": "blocked_force", "pressure_kPa": [60.0, 120.0, 240.0], "force_N": [20.1, 43.0, 90.5]})
+    points = pd.DataFrame(
+        {"kind": "blocked_force", "pressure_kPa": [60.0, 120.0, 240.0], "force_N": [20.1, 43.0, 90.5]}
+    )
     points = points.assign(level_kPa=points["pressure_kPa"], branch="", contraction=0.0, censored=False)
     a = rng.standard_normal((4, n_draws))
     draws = {
@@ -87,14 +119,25 @@ def muscle(rows_per_branch: int = 240, n_draws: int = 2000, **changes: Any) -> C
         "tip_factor": 0.94 + 0.05 * (0.8 * a[1] + 0.6 * a[2]),
         "noise_sd_N": 0.25 * np.exp(0.02 * a[3]),
     }
-    scale = {"a_1": 300.0, "b_1": 3e6, "a_2": 900.0, "b_2": 9e6, "K_f": 0.1, "P_DB_kPa": 14.4, "tip_factor": 0.3, "noise_sd_N": 0.4}
+    scale = {
+        "a_1": 300.0,
+        "b_1": 3e6,
+        "a_2": 900.0,
+        "b_2": 9e6,
+        "K_f": 0.1,
+        "P_DB_kPa": 14.4,
+        "tip_factor": 0.3,
+        "noise_sd_N": 0.4,
+    }
     priors = {name: draws[name].mean() + s * rng.standard_normal(n_draws) for name, s in scale.items()}
     units = {"P_DB_kPa": "kPa", "noise_sd_N": "N", "a_1": "Pa/kPa", "a_2": "Pa/kPa", "b_1": "Pa", "b_2": "Pa"}
     summary = summary_of(draws, priors, units)
     values: dict[str, Any] = {
         "name": "MPAM1",
         "material": "Ecoflex 00-50",
-        "simulation": Simulation(kinematics="constant_thickness", strain="stretch", order=2, effects=("dead_band",)),
+        "simulation": Simulation(
+            kinematics="constant_thickness", strain="stretch", order=2, effects=("dead_band",)
+        ),
         "summary": summary,
         "bands": pd.concat(bands, ignore_index=True),
         "observed": pd.concat([*observed, points], ignore_index=True),
@@ -130,13 +173,19 @@ def material(n_draws: int = 2000, **changes: Any) -> CalibrationView:
             "cycle": 1, "stroke": 0, "time_s": np.nan, "censored": False,
         }
     )  # fmt: skip
-    draws = {f"E_{k}": m * (1 + 0.03 * rng.standard_normal(n_draws)) for k, m in ((1, 8e4), (2, -2.1e4), (3, 6e3))}
+    draws = {
+        f"E_{k}": m * (1 + 0.03 * rng.standard_normal(n_draws)) for k, m in ((1, 8e4), (2, -2.1e4), (3, 6e3))
+    }
     priors = {name: x.mean() + 2e5 * rng.standard_normal(n_draws) for name, x in draws.items()}
     summary = summary_of(draws, priors, dict.fromkeys(draws, "Pa"))
     ranges = [
         (low, high, high == 3.0, quantity, unit, mean * (1 + 0.1 * (3 - high)), mean * 0.95, mean * 1.2)
         for low, high in ((0.0, 0.5), (0.1, 1.0), (0.1, 3.0))
-        for quantity, unit, mean in (("E_1", "Pa", 8e4), ("stress at strain 0.5", "Pa", 3.5e4), ("blocked force", "N", 74.0))
+        for quantity, unit, mean in (
+            ("E_1", "Pa", 8e4),
+            ("stress at strain 0.5", "Pa", 3.5e4),
+            ("blocked force", "N", 74.0),
+        )
     ]
     columns = ["strain_low", "strain_high", "used", "quantity", "unit", "mean", "q05", "q95"]
     values: dict[str, Any] = {

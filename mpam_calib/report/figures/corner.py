@@ -39,6 +39,7 @@ def draw(view: CalibrationView) -> Figure:
                 ax = figure.add_axes((*corner, (cell - GAP) / width, (cell - GAP) / height))
                 if row == column:
                     _diagonal(ax, draws[row])
+                    ax.set_title(names[row], fontsize=7.5, loc="center")
                 else:
                     _pair(ax, draws[column], draws[row])
                 ax.set_xlim(*_limits(draws[column]))

@@ -30,7 +30,7 @@ STYLE: Final[dict[str, Any]] = {
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
     "axes.formatter.limits": (-4, 6),
-    "axes.formatter.use_mathtext": True,
+    "text.parse_math": False,  # names are the user's: a $ in one is a $
     "grid.color": "#e8ebef",
     "grid.linewidth": 0.6,
     "xtick.color": "#8a94a0",
