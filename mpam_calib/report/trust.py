@@ -235,7 +235,7 @@ def _sentence(level: Level, limits: list[Limit]) -> str:
         others = " and ".join(x.brief for x in limits if x.level == "caution")
         return f"Use these numbers with care: {others}."
     if limits:
-        return f"Yes, with these bands; {limits[0].brief}."
+        return f"Yes, you can use these numbers with their bands; but {limits[0].brief}."
     return "Yes: you can use these numbers with their bands."
 
 

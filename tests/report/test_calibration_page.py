@@ -44,7 +44,7 @@ def test_first_screen_states_both_numbers_with_their_bands(view: CalibrationView
         assert f"{value} {unit}" in lead
         assert f"90 % band {band} {unit}" in lead
     assert "At 250 kPa, MPAM1 pulls with" in lead
-    assert "Yes, with these bands" in lead
+    assert "Yes, you can use these numbers with their bands; but the data say nothing" in lead
 
 
 def test_every_section_is_there(html: str) -> None:
