@@ -116,12 +116,17 @@ def _floor_clip(signal: Array, at: float) -> Array:
     return np.maximum(signal, -at)
 
 
+def _compress(signal: Array, at: float) -> Array:
+    """A cell that saturates softly: a fifth of the slope above `at`."""
+    return np.where(signal > at, at + 0.2 * (signal - at), signal)
+
+
 def _quantise(signal: Array, step: float) -> Array:
     """A converter with too few bits."""
     return step * np.round(signal / step)
 
 
-READOUT = ("clip", "floor_clip", "quantisation")
+READOUT = ("clip", "floor_clip", "compress", "quantisation")
 KINDS: tuple[str, ...] = (*ADDITIVE, *READOUT)
 
 
@@ -145,6 +150,7 @@ def disturb(signal: Array, noise: Array, rows: Rows, outside: Outside, seed: int
         return signal + noise + added, signal + added
     apply, low, high = {
         "clip": (_clip, float(signal.max()), float(np.median(signal))),
+        "compress": (_compress, float(signal.max()), float(np.median(signal))),
         "floor_clip": (_floor_clip, -float(signal.min()), -float(np.median(signal))),
         "quantisation": (_quantise, 1e-6, float(np.ptp(signal))),
     }[outside.kind]

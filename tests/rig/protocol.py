@@ -14,7 +14,8 @@ class Protocol:
     """One isobaric force-displacement test.
 
     At every level the crosshead runs `cycles` cycles at each of `speeds_mm_s` from the initial length to
-    `stroke_fraction` of the level's free contraction and back, after `dwell_s` at rest at both ends.
+    `stroke_fraction` of the level's free contraction (or `strokes_mm`) and back, with `dwell_s` of rest at
+    both ends.
     Noise: white sd and an exponentially correlated part (sd, time constant [s]), both in N.
     """
 
@@ -26,6 +27,7 @@ class Protocol:
     rows_max: int = 3000
     motion: str = "triangle"
     stroke_fraction: float = 0.85
+    strokes_mm: tuple[float, ...] = ()
     pause_s: float = 20.0
     noise_N: float = 0.1
     correlated_N: float = 0.05
@@ -101,8 +103,8 @@ def _sampling_step(p: Protocol, strokes: list[float]) -> float:
 def record_rows(p: Protocol, muscle: Muscle, seed: int) -> Rows:
     """The rows of the test; strokes follow from the declared muscle's own free contraction."""
     rng = np.random.default_rng([seed, 11])
-    strokes = [p.stroke_fraction * free_contraction(muscle, level) * muscle.geometry.L0_mm
-               for level in p.levels_kPa]
+    scale = p.stroke_fraction * muscle.geometry.L0_mm
+    strokes = list(p.strokes_mm) or [scale * free_contraction(muscle, level) for level in p.levels_kPa]
     if min(strokes) <= 0.0:
         raise ValueError("a level at which the muscle does not contract")
     dt = _sampling_step(p, strokes)

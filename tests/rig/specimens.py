@@ -58,6 +58,11 @@ def geometry_of(family: Family, rng: random.Random) -> tuple[Geometry, Braid, fl
     return g, b, float(round(rng.uniform(*family.top_kPa) / 10) * 10)
 
 
+def whole_levels(shares: tuple[float, ...], top_kPa: float) -> tuple[float, ...]:
+    """Levels in whole kPa from shares of the highest."""
+    return tuple(float(round(top_kPa * share)) for share in shares)
+
+
 def _scaled(law: Law, factor: float) -> Law:
     return replace(law, constants=tuple(tuple(factor * c for c in row) for row in law.constants))
 
@@ -103,10 +108,11 @@ def tensile_muscle(family: Family, rng: random.Random, friction: str = "coulomb"
 
 def loops_muscle(family: Family, rng: random.Random, law: str = "linear", order: int = 3,
                  friction: str = "coulomb", strain: str = "engineering",
-                 levels_kPa: tuple[float, ...] = ()) -> tuple[Muscle, float]:
+                 level_shares: tuple[float, ...] = ()) -> tuple[Muscle, float]:
     """A muscle whose moduli are free in the fit; `strain` "stretch" is the constant-thickness reading.
 
-    Moduli rise with the pressure: E_k(P) = E_k (0.7 + 0.6 P/P_top), cast into the declared law.
+    Moduli rise with the pressure, E_k(P) = E_k (1 - r/2 + r P/P_top) for the linear law; alike for others.
+    A "free" law names its levels: the shares of the top level, in whole kPa.
     """
     muscle, top = tensile_muscle(family, rng, friction, order=order)
     base = np.array([c[0] for c in muscle.simulation.law.constants])
@@ -115,6 +121,7 @@ def loops_muscle(family: Family, rng: random.Random, law: str = "linear", order:
                                         law=_stretch_law(muscle, top, order))
         return muscle, top
     rise = rng.uniform(0.3, 0.7)
+    levels_kPa = whole_levels(level_shares, top)
     made = {
         "constant": Law("constant", tuple((float(e),) for e in base)),
         "linear": Law("linear", tuple((rise * e / top, (1.0 - 0.5 * rise) * e) for e in base)),
@@ -127,7 +134,7 @@ def loops_muscle(family: Family, rng: random.Random, law: str = "linear", order:
 
 
 def _stretch_law(muscle: Muscle, top: float, order: int) -> Law:
-    """Linear law in stretches, least squares to the muscle's own static map (a calibration as labs make it)."""
+    """Linear law in stretches, least squares to the muscle's own static map (as labs calibrate)."""
     wanted = muscle.with_simulation(friction="none")
     p, gamma = np.meshgrid(np.linspace(0.2, 1.0, 9) * top, np.linspace(0.0, 0.25, 26))
     p, gamma = p.ravel(), gamma.ravel()
