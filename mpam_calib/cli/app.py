@@ -11,3 +11,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+# The commands, in the order in which the help lists them; each module registers its own on ``app``.
+from mpam_calib.cli import init  # noqa: E402, F401  isort: skip
+from mpam_calib.cli import check  # noqa: E402, F401  isort: skip

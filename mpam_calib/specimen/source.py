@@ -72,8 +72,8 @@ def data_files(source: TomlSource, declaration: Declaration) -> list[DataFile]:
             keys = ["files", kind]
             path = folder / name
             if not path.resolve().is_relative_to(folder.resolve()):
-                found = f"a file outside the specimen's folder ({quoted(name)})"
-                raise fault(source, keys, found, "one inside it")
+                outside = f"a file outside the specimen's folder ({quoted(name)})"
+                raise fault(source, keys, outside, "one inside it")
             if path.resolve() in found:
                 raise fault(source, keys, f"{quoted(name)} twice", "every file once")
             if not path.exists():

@@ -1,0 +1,35 @@
+"""``mpam-calib init``: a commented specimen folder to fill in."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mpam_calib.cli.app import app
+
+
+@app.command()
+def init(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to make (it may exist).")],
+) -> None:
+    """Write a commented specimen.toml into DIR; the data files that it names go beside it."""
+    from mpam_calib.errors import InputError
+    from mpam_calib.specimen.toml_source import SPECIMEN_FILE
+    from mpam_calib.specimen.wording import os_reason
+
+    target = folder / SPECIMEN_FILE
+    if target.exists():
+        raise InputError(target, "a specimen that is there already", "a folder without one")
+    template = resources.files("mpam_calib.specimen").joinpath("templates", SPECIMEN_FILE)
+    text = template.read_text(encoding="utf-8")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        target.write_text(text, encoding="utf-8")
+    except FileExistsError:
+        raise InputError(folder, "a file", "a folder to make") from None
+    except OSError as error:
+        raise InputError(folder, os_reason(error), "a folder that can be written") from None
+    typer.echo(f"{target}: edit it, put loops.csv beside it, then run: mpam-calib check {folder}")
