@@ -82,3 +82,10 @@ def shape_constant_thickness(L: Array, rest: Rest) -> Shape:
 def tip_shortened_length(L: Array, R: Array, rest: Rest, factor: Array) -> Array:
     """Working length (m) with rounded tips: L′ = L − 2·factor·(π/2 − 1)(R − R0) (thesis Eq. 2.46-2.47)."""
     return L - 2.0 * factor * (np.pi / 2.0 - 1.0) * (R - rest.R0)
+
+
+SHAPES = {
+    "inextensible_braid": shape_inextensible_braid,
+    "constant_thickness": shape_constant_thickness,
+}
+"""The two kinematics by their declared names."""

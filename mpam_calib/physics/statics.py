@@ -55,9 +55,7 @@ def modulus_columns(shape: Shape, rest: Rest, convention: str, order: int) -> Ar
     return np.stack([axial * z**k - hoop * x**k for k in range(1, order + 1)], axis=-1)
 
 
-def braid_energy_force(
-    P: Array, L: Array, rest: Rest, E_br: float, R_br: float, n: int
-) -> Array:
+def braid_energy_force(P: Array, L: Array, rest: Rest, E_br: float, R_br: float, n: int) -> Array:
     """Force lost to the energy in the stretched strands, N (thesis Eq. 2.25; to be subtracted).
 
     F_br = L/(E_br A_br n) · 4π²P²B³/(2πN)⁴ with B = L0/sin α0 and 2πN = B cos α0 / R0.

@@ -1,0 +1,105 @@
+"""Calibrating one specimen: the whole way from recordings to draws, in memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpam_calib.model.model import MaterialPosterior, Model, Options
+from mpam_calib.posterior.checkpoint import Checkpoint
+from mpam_calib.posterior.collapsed import Collapsed
+from mpam_calib.posterior.convergence import ESS_WANTED
+from mpam_calib.posterior.draws import Draws, Reported, keep_draws, reported
+from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Sampling, sample
+from mpam_calib.posterior.summary import all_converged, summarise
+from mpam_calib.posterior.target import build_target, locate
+from mpam_calib.prediction.bands import muscle_bands, stress_bands
+from mpam_calib.specimen.recording import Specimen
+from mpam_calib.units import KPA
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A specimen's posterior: how it was drawn, and what it says."""
+
+    specimen: Specimen
+    target: Collapsed
+    sampling: Sampling
+    draws: Draws
+    seed: int
+    ess_wanted: float = ESS_WANTED
+
+    @property
+    def model(self) -> Model:
+        """The model that was calibrated."""
+        return self.target.model
+
+    @cached_property
+    def reported(self) -> list[Reported]:
+        """Every reported quantity with its draws, lab units."""
+        return reported(self.model, self.draws, self.seed)
+
+    @cached_property
+    def summary(self) -> pd.DataFrame:
+        """The table ``summary.csv``."""
+        return summarise(self.reported, self.model.names, self.sampling)
+
+    @property
+    def converged(self) -> bool:
+        """Whether every reported quantity meets the limits on R-hat and ESS."""
+        return all_converged(self.summary, self.sampling, self.ess_wanted)
+
+    def bands(self, pressures_kPa: Array | list[float] | None = None) -> pd.DataFrame:
+        """Credible bands at pressures (kPa; the specimen's levels by default), as in ``bands.csv``."""
+        return predict(self.model, self.draws, self.specimen, self.seed, pressures_kPa)
+
+
+def predict(
+    model: Model,
+    draws: Draws,
+    specimen: Specimen,
+    seed: int,
+    pressures_kPa: Array | list[float] | None = None,
+) -> pd.DataFrame:
+    """Bands of everything the model predicts: the muscle's at the pressures, the material's stress."""
+    parts = []
+    if model.chain is not None:
+        pressures = specimen.levels_Pa if pressures_kPa is None else np.asarray(pressures_kPa) * KPA
+        parts.append(muscle_bands(model, draws, specimen, pressures, seed))
+    if model.tensile is not None:
+        parts.append(stress_bands(model, draws, seed))
+    return pd.concat(parts, ignore_index=True)
+
+
+def calibrate(
+    specimen: Specimen,
+    *,
+    seed: int = 0,
+    max_steps: int = MAX_STEPS,
+    ess_wanted: float = ESS_WANTED,
+    options: Options | None = None,
+    material: MaterialPosterior | None = None,
+    checkpoint: Checkpoint | None = None,
+    listener: Listener | None = None,
+) -> Calibration:
+    """Draw the posterior of a specimen's declared simulation.
+
+    Raises ``InputError`` where the specimen cannot carry the model. See ``Calibration.converged`` for
+    whether the draws can be used.
+    """
+    target = build_target(specimen, options, material)
+    found = checkpoint.load("modes") if checkpoint else None
+    if found is None:
+        found = locate(target, np.random.default_rng([seed, 0]))
+        if checkpoint:
+            checkpoint.save("modes", found)
+    target, modes = found
+    sampling = sample(target, modes, seed, max_steps, ess_wanted, checkpoint, listener)
+    draws = keep_draws(target, sampling, seed)
+    return Calibration(specimen, target, sampling, draws, seed, ess_wanted)

@@ -1,0 +1,37 @@
+"""Braid angle: the sleeve's true angle at rest differs from the declared one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.state import Setting, State
+from mpam_calib.units import DEG
+
+LIMITS = (5.0 * DEG, 89.0 * DEG)
+
+
+def _parameters(setting: Setting) -> tuple[Parameter, ...]:
+    sd = setting.geometry.sd.alpha0_deg or 2.0
+    return (Parameter("delta_alpha_deg", Normal(0.0, sd * DEG), "true braid angle minus the declared one"),)
+
+
+def _apply(state: State, values: Values, setting: Setting) -> State:
+    alpha0 = np.clip(state.rest.alpha0 + values["delta_alpha_deg"], *LIMITS)
+    return replace(state, rest=state.rest._replace(alpha0=alpha0))
+
+
+register(
+    Effect(
+        id="braid_angle",
+        stage=Stage.SHAPE,
+        title="Braid angle",
+        sentence="the sleeve's angle at rest is not the declared one",
+        source="thesis Eq. 2.1-2.3 with another α0",
+        parameters=_parameters,
+        apply=_apply,
+    )
+)

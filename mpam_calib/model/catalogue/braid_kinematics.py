@@ -1,0 +1,30 @@
+"""Braid kinematics: the radius follows the inextensible strands, not a wall of constant thickness."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.priors import Parameter
+from mpam_calib.model.state import Setting, State
+
+
+def _parameters(setting: Setting) -> tuple[Parameter, ...]:
+    return ()
+
+
+def _apply(state: State, values: Values, setting: Setting) -> State:
+    return replace(state, kinematics="inextensible_braid")
+
+
+register(
+    Effect(
+        id="braid_kinematics",
+        stage=Stage.SHAPE,
+        title="Braid kinematics",
+        sentence="the radius follows the strands of the sleeve, not the wall's constant thickness",
+        source="thesis Eq. 2.10, 2.23 in place of Eq. 4.16",
+        parameters=_parameters,
+        apply=_apply,
+    )
+)

@@ -1,0 +1,38 @@
+"""Coulomb friction: in proportion to the force (thesis Eq. 2.44)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.priors import HalfNormal, Parameter
+from mpam_calib.model.state import Setting, State
+
+SCALE = 0.2
+"""Scale of the prior on K_f; the thesis finds 0.07-0.09 (Table 4.10)."""
+
+
+def k_f(name: str = "K_f") -> Parameter:
+    """The friction factor's parameter, under its own or a level's name."""
+    return Parameter(name, HalfNormal(SCALE), "friction as a share of the force", "thesis Eq. 2.44", "")
+
+
+def _parameters(setting: Setting) -> tuple[Parameter, ...]:
+    return (k_f(),)
+
+
+def _apply(state: State, values: Values, setting: Setting) -> State:
+    return replace(state, coulomb=state.coulomb + values["K_f"])
+
+
+register(
+    Effect(
+        id="coulomb_friction",
+        stage=Stage.FRICTION,
+        title="Coulomb friction",
+        sentence="friction grows with the force: pulling out takes more than letting in",
+        source="thesis Eq. 2.44",
+        parameters=_parameters,
+        apply=_apply,
+    )
+)

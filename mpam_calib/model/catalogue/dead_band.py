@@ -1,0 +1,36 @@
+"""Pressure dead-band: the part of the pressure that does no work (thesis Eq. 2.45)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.priors import BelowNormal, Parameter
+from mpam_calib.model.state import Setting, State
+
+
+def _parameters(setting: Setting) -> tuple[Parameter, ...]:
+    # Both signs: a gauge that reads low looks like a negative dead-band. A level at which the muscle
+    # was seen to pull lies above it.
+    sd = setting.pressure_bias_sd or 0.1 * setting.top_pressure
+    prior = BelowNormal(0.0, sd, setting.pulls_at)
+    return (Parameter("P_DB_kPa", prior, "pressure that does no work", "thesis Eq. 2.45"),)
+
+
+def _apply(state: State, values: Values, setting: Setting) -> State:
+    return replace(state, pressure=np.maximum(state.pressure - values["P_DB_kPa"], 0.0))
+
+
+register(
+    Effect(
+        id="dead_band",
+        stage=Stage.RIG,
+        title="Pressure dead-band",
+        sentence="the first part of the pressure does no work (or the gauge has a zero offset)",
+        source="thesis Eq. 2.45; Hocking & Wereley 2013",
+        parameters=_parameters,
+        apply=_apply,
+    )
+)

@@ -1,0 +1,32 @@
+"""Force drift: the load cell's zero wanders over the test."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.state import Setting, State
+from mpam_calib.units import MINUTE
+
+
+def _parameters(setting: Setting) -> tuple[Parameter, ...]:
+    sd = 0.02 * setting.force_scale / (10.0 * MINUTE)
+    return (Parameter("drift_N_per_min", Normal(0.0, sd), "wander of the load cell's zero"),)
+
+
+def _apply(state: State, values: Values, setting: Setting) -> State:
+    return replace(state, zero=state.zero + values["drift_N_per_min"] * state.readings.time)
+
+
+register(
+    Effect(
+        id="force_drift",
+        stage=Stage.SENSOR,
+        title="Force drift",
+        sentence="the load cell's zero wanders while the test runs",
+        source="linear in time over the whole test",
+        parameters=_parameters,
+        apply=_apply,
+    )
+)

@@ -1,0 +1,31 @@
+"""Pressure droop: at full stroke the muscle's pressure is below the reading at the regulator."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.priors import HalfNormal, Parameter
+from mpam_calib.model.state import Setting, State
+
+
+def _parameters(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("droop_percent", HalfNormal(0.05), "pressure missing at full stroke"),)
+
+
+def _apply(state: State, values: Values, setting: Setting) -> State:
+    part = state.displacement / setting.stroke
+    return replace(state, pressure=state.pressure * (1.0 - values["droop_percent"] * part))
+
+
+register(
+    Effect(
+        id="pressure_droop",
+        stage=Stage.RIG,
+        title="Pressure droop",
+        sentence="the supply does not hold the pressure: at full stroke the muscle sees less than the gauge",
+        source="first order in the stroke: P(1 − droop·x/stroke)",
+        parameters=_parameters,
+        apply=_apply,
+    )
+)

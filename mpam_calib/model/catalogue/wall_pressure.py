@@ -1,0 +1,30 @@
+"""Wall pressure: how much of the wall's thickness term is really there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.state import Setting, State
+
+
+def _parameters(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("wall_factor", Normal(0.0, 1.0), "share of the thickness term to take away", "", ""),)
+
+
+def _apply(state: State, values: Values, setting: Setting) -> State:
+    return replace(state, wall_factor=state.wall_factor * (1.0 - values["wall_factor"]))
+
+
+register(
+    Effect(
+        id="wall_pressure",
+        stage=Stage.STATICS,
+        title="Wall pressure",
+        sentence="the wall carries the pressure through its thickness, so it costs less force than declared",
+        source="thesis Eq. 2.9 (force balance, factor 0) against virtual work (factor 1)",
+        parameters=_parameters,
+        apply=_apply,
+    )
+)

@@ -1,0 +1,184 @@
+"""The chain: from a row of readings to the force it should show.
+
+rig → shape → statics → friction → history → sensor. Given the sampled values the force is linear in
+the moduli's coordinates η: :meth:`Chain.terms` returns the two parts, :meth:`Chain.force` the force
+for known η.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.effect import Effect, Stage, Values
+from mpam_calib.model.effect import effect as effect_by_id
+from mpam_calib.model.friction import DeclaredFriction
+from mpam_calib.model.moduli import ModuliBlock, rate_parameters
+from mpam_calib.model.nuisance import apply_nuisances, nuisance_parameters
+from mpam_calib.model.priors import Parameter
+from mpam_calib.model.readings import Readings
+from mpam_calib.model.reference import rest_of
+from mpam_calib.model.state import Setting, State
+from mpam_calib.physics.friction import coulomb_factor, strand_friction_per_f_s
+from mpam_calib.physics.kinematics import SHAPES, Shape
+from mpam_calib.physics.statics import gas_force, modulus_columns, thickness_force
+
+Array = NDArray[np.float64]
+
+FIXED_POINT_STEPS = 12
+FIXED_POINT_TOLERANCE = 1e-6
+"""Newtons between two rounds of the force's fixed point."""
+
+
+class Terms(NamedTuple):
+    """F = fixed + columns·η: newtons, shapes (B, n) and (B, n, p)."""
+
+    fixed: Array
+    columns: Array
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A declared simulation with its effects, ready to be evaluated for many parameter vectors."""
+
+    setting: Setting
+    moduli: ModuliBlock | None
+    with_nuisances: bool = True
+
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """The declared effects in the order of the chain."""
+        return tuple(
+            sorted((effect_by_id(i) for i in self.setting.simulation.effects), key=lambda e: e.stage)
+        )
+
+    @cached_property
+    def friction(self) -> DeclaredFriction:
+        """The declared friction."""
+        return DeclaredFriction(self.setting)
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Everything sampled for the force: friction, effects, the law's rates, nuisances."""
+        simulation = self.setting.simulation
+        found = list(self.friction.parameters())
+        for item in self.effects:
+            found += item.parameters(self.setting)
+        if self.moduli is not None and self.moduli.root is None:
+            found += rate_parameters(simulation.law, simulation.order, self.setting.levels)
+        if self.with_nuisances:
+            found += nuisance_parameters(self.setting)
+        return tuple(found)
+
+    @property
+    def linear_size(self) -> int:
+        """Number of the moduli's coordinates."""
+        return 0 if self.moduli is None else self.moduli.size
+
+    @property
+    def uses_force(self) -> bool:
+        """Whether an effect needs the muscle's own force."""
+        return any(item.uses_force for item in self.effects)
+
+    def terms(self, values: Values, readings: Readings, guide: Array | None = None) -> Terms:
+        """The force's fixed part and its columns.
+
+        ``values``: (B, 1) arrays, SI. ``guide`` (n,): a force estimate (N) for what depends on the
+        force itself (the sign in Coulomb's law, a fixture's give); without one the muscle pulls and
+        the fixture is stiff.
+        """
+        known = np.ones(len(readings)) if guide is None else guide
+        state, shape = self._to_shape(values, readings, np.zeros(len(readings)) if guide is None else guide)
+        fixed, columns = self._statics(state, shape, values)
+        state = self._to_sensor(state, values)
+        slope = state.gain * coulomb_factor(state.friction_gain * state.coulomb, state.sign, np.sign(known))
+        return Terms(
+            slope * fixed + self._strand_force(state) + state.zero,
+            (slope + np.zeros(fixed.shape))[..., None] * columns,
+        )
+
+    def force(self, values: Values, eta: Array, readings: Readings) -> Array:
+        """Force (B, n), N, for coordinates η (B, p): exact, by fixed point where effects need the force."""
+        guide = np.zeros((1, len(readings)))
+        for _ in range(FIXED_POINT_STEPS if self.uses_force else 1):
+            state, shape = self._to_shape(values, readings, guide)
+            fixed, columns = self._statics(state, shape, values)
+            free = fixed + np.einsum("...np,...p->...n", columns, eta) if columns.shape[-1] else fixed
+            state = self._to_sensor(state, values)
+            free = state.gain * free
+            friction = state.friction_gain * state.coulomb * np.abs(free) * state.sign
+            force: Array = free + friction + self._strand_force(state) + state.zero
+            if np.max(np.abs(force - guide), initial=0.0) < FIXED_POINT_TOLERANCE:
+                break
+            guide = force
+        return force
+
+    def _to_shape(self, values: Values, readings: Readings, guide: Array) -> tuple[State, Shape]:
+        state = self._start(readings, guide)
+        if self.with_nuisances:
+            state = apply_nuisances(state, values)
+        state = self._stage(Stage.RIG, state, values)
+        state = replace(state, length=state.rest.L0 - state.displacement)
+        state = self._stage(Stage.SHAPE, state, values)
+        length = np.maximum(state.length, 0.05 * state.rest.L0)
+        return state, SHAPES[state.kinematics](length, state.rest)
+
+    def _statics(self, state: State, shape: Shape, values: Values) -> tuple[Array, Array]:
+        state = self._stage(Stage.STATICS, state, values)
+        P = state.pressure
+        fixed = gas_force(P, shape) + state.wall_factor * thickness_force(P, shape) - state.lost
+        if self.moduli is None:
+            return fixed, np.zeros((*fixed.shape, 0))
+        simulation = self.setting.simulation
+        # Only history changes the bladder's stress itself; its factor belongs to these columns.
+        gain = self._stage(Stage.HISTORY, state, values).wall_gain
+        per_modulus = modulus_columns(shape, state.rest, simulation.strain, simulation.order)
+        readings = state.readings
+        mean, columns = self.moduli.columns(readings.pressure, readings.level, per_modulus, values)
+        return fixed + gain * mean, np.broadcast_to(gain, mean.shape)[..., None] * columns
+
+    def _to_sensor(self, state: State, values: Values) -> State:
+        state = self.friction.apply(state, values)
+        for stage in (Stage.FRICTION, Stage.HISTORY, Stage.SENSOR):
+            state = self._stage(stage, state, values)
+        return state
+
+    def _strand_force(self, state: State) -> Array:
+        braid = self.setting.braid
+        if braid is None or not np.any(state.strand):
+            return np.zeros(1)
+        unit = strand_friction_per_f_s(state.pressure, state.length, state.rest, braid.E_br, braid.nu_s)
+        result: Array = state.friction_gain * state.strand * state.sign * unit
+        return result
+
+    def _stage(self, stage: Stage, state: State, values: Values) -> State:
+        for item in self.effects:
+            if item.stage == stage:
+                state = item.apply(state, values, self.setting)
+        return state
+
+    def _start(self, readings: Readings, guide: Array) -> State:
+        zero, one = np.zeros((1, 1)), np.ones((1, 1))
+        geometry = self.setting.geometry
+        return State(
+            readings=readings,
+            guide=np.atleast_2d(guide),
+            pressure=readings.pressure[None, :],
+            displacement=readings.displacement[None, :],
+            rest=rest_of(geometry),
+            kinematics=self.setting.simulation.kinematics,
+            length=zero,
+            wall_factor=one,
+            lost=zero,
+            sign=readings.sign[None, :],
+            coulomb=zero,
+            strand=zero,
+            friction_gain=one,
+            wall_gain=one,
+            gain=one,
+            zero=zero,
+        )

@@ -1,0 +1,81 @@
+"""An effect: one thing that a real muscle or rig does and a simulation may leave out.
+
+An effect is a value: an id, the stage of the chain where it acts, what it is in words, its
+parameters with normalised priors, and a pure function on the chain's state. A model holds a set of
+them; nothing else in the package knows any effect by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.priors import Parameter
+from mpam_calib.model.state import Setting, State
+
+Array = NDArray[np.float64]
+Values = Mapping[str, Array]
+"""Parameter values by name, SI units, shape (B, 1)."""
+
+
+class Stage(IntEnum):
+    """The stages of the chain, in the order in which a reading passes them."""
+
+    RIG = 1
+    SHAPE = 2
+    STATICS = 3
+    FRICTION = 4
+    HISTORY = 5
+    SENSOR = 6
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect (see the module's docstring).
+
+    ``sentence`` is for a rig engineer; ``source`` names the equation's origin; ``parameters`` gives
+    the priors for a setting; ``apply`` returns the changed state. ``uses_force`` is set where it
+    needs the muscle's own force (a fixture that gives way), which the chain then finds by fixed
+    point. ``needs_braid`` is set where it needs the declared strands.
+    """
+
+    id: str
+    stage: Stage
+    title: str
+    sentence: str
+    source: str
+    parameters: Callable[[Setting], tuple[Parameter, ...]]
+    apply: Callable[[State, Values, Setting], State]
+    uses_force: bool = False
+    needs_braid: bool = False
+
+
+_REGISTRY: dict[str, Effect] = {}
+
+
+def register(effect: Effect) -> Effect:
+    """Make an effect known under its id; raises ValueError where the id is taken."""
+    if effect.id in _REGISTRY:
+        raise ValueError(f"an effect with the id {effect.id!r} is registered already")
+    _REGISTRY[effect.id] = effect
+    return effect
+
+
+def effect(identifier: str) -> Effect:
+    """The effect with this id; raises KeyError where there is none."""
+    _load_catalogue()
+    return _REGISTRY[identifier]
+
+
+def known_effects() -> tuple[str, ...]:
+    """The ids of all registered effects, in the order of the chain."""
+    _load_catalogue()
+    return tuple(sorted(_REGISTRY, key=lambda i: (_REGISTRY[i].stage, i)))
+
+
+def _load_catalogue() -> None:
+    import mpam_calib.model.catalogue  # noqa: F401

@@ -1,0 +1,64 @@
+"""The declared friction as part of the chain: one factor, or one for each level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.catalogue.coulomb_friction import k_f
+from mpam_calib.model.catalogue.strand_friction import f_s
+from mpam_calib.model.effect import Values
+from mpam_calib.model.priors import Parameter
+from mpam_calib.model.readings import Readings
+from mpam_calib.model.state import Setting, State
+from mpam_calib.units import KPA
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DeclaredFriction:
+    """Coulomb (Eq. 2.44), strand (Eq. 2.43) or no friction, as ``[simulation]`` declares it."""
+
+    setting: Setting
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the sampled factors, one or one for each level."""
+        simulation = self.setting.simulation
+        if simulation.friction == "none":
+            return []
+        stem = "K_f" if simulation.friction == "coulomb" else "f_s"
+        if not simulation.friction_by_pressure:
+            return [stem]
+        return [f"{stem}@{level / KPA:.0f}" for level in self.setting.levels]
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The factors' priors."""
+        make = k_f if self.setting.simulation.friction == "coulomb" else f_s
+        return tuple(make(name) for name in self.names)
+
+    def apply(self, state: State, values: Values) -> State:
+        """Add the declared friction to the state."""
+        names = self.names
+        if not names:
+            return state
+        if len(names) == 1:
+            factor = values[names[0]]
+        else:
+            factor = (
+                np.concatenate([values[name] for name in names], axis=1) @ self._weights(state.readings).T
+            )
+        if self.setting.simulation.friction == "coulomb":
+            return replace(state, coulomb=state.coulomb + factor)
+        return replace(state, strand=state.strand + factor)
+
+    def _weights(self, readings: Readings) -> Array:
+        """Share of each level's factor in each row, (n, levels): its own level, else interpolated."""
+        eye = np.eye(len(self.setting.levels))
+        weights = np.stack([np.interp(readings.pressure, self.setting.levels, row) for row in eye], axis=-1)
+        known = readings.level >= 0
+        weights[known] = eye[readings.level[known]]
+        return weights

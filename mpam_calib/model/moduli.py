@@ -1,0 +1,184 @@
+"""The bladder's moduli as a linear block: E_k(P) = Σ_a coefficient_{a,k} h_a(P).
+
+The force is linear in the coefficients, so they are integrated out. Their prior is stated in
+newtons on the reference grid: with the grid's columns G = QR (pressure part ⊗ contraction part) the
+block's coordinates η ~ N(0, I) give forces Q η of root mean square ``scale``; coefficients are
+``mean + transform·η`` exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.effect import Values
+from mpam_calib.model.priors import LogNormal, Normal, Parameter, Prior
+from mpam_calib.units import KPA
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def rate_names(law: str, order: int) -> list[str]:
+    """Names of a law's rates as they are sampled: d and its distance to z (so that d > z)."""
+    if law == "exponential":
+        return ["d", "gap"]
+    if law == "exponential_each":
+        return [f"{name}_{k}" for k in range(1, order + 1) for name in ("d", "gap")]
+    return []
+
+
+def rate_parameters(law: str, order: int, levels: Array) -> tuple[Parameter, ...]:
+    """Priors of the rates, in 1/Pa: d of order one over the pressure span, z below it (thesis Eq. 4.8)."""
+    span = float(levels[-1] - levels[0]) or float(levels[-1])
+    priors: dict[str, Prior] = {"d": Normal(0.0, 2.0 / span), "gap": LogNormal(5.0 / span, 1.0)}
+    meaning = {"d": "the slower rate of the law", "gap": "how much lower the other rate z is"}
+    return tuple(
+        Parameter(name, priors[name.split("_")[0]], meaning[name.split("_")[0]], "thesis Eq. 4.8", "1/kPa")
+        for name in rate_names(law, order)
+    )
+
+
+@dataclass(frozen=True)
+class Law:
+    """h_a(P) for one law, and the names of its coefficients.
+
+    ``terms`` are the printed letters (a, b), (c, w), (E,) or (E@level...); ``units`` their units;
+    ``factors`` the SI size of each unit.
+    """
+
+    name: str
+    order: int
+    levels: Array
+
+    @property
+    def terms(self) -> int:
+        """How many functions h_a of pressure the law has."""
+        return {
+            "constant": 1,
+            "linear": 2,
+            "exponential": 2,
+            "exponential_each": 2,
+            "free": len(self.levels),
+        }[self.name]
+
+    def coefficient_names(self) -> list[str]:
+        """Names in the block's order (a major, k minor)."""
+        letters = {"constant": ["E"], "linear": ["a", "b"], "exponential": ["c", "w"]}
+        letters["exponential_each"] = letters["exponential"]
+        orders = range(1, self.order + 1)
+        if self.name == "free":
+            return [f"E_{k}@{level / KPA:g}" for level in np.round(self.levels, 0) for k in orders]
+        return [f"{letter}_{k}" for letter in letters[self.name] for k in orders]
+
+    def coefficient_units(self) -> list[tuple[str, float]]:
+        """(printed unit, SI size) of each coefficient."""
+        pairs = [("Pa", 1.0)] * (self.terms * self.order)
+        if self.name == "linear":
+            pairs[: self.order] = [("Pa/kPa", 1.0 / KPA)] * self.order
+        return pairs
+
+    def basis(self, pressure: Array, level: Ints, values: Values) -> Array:
+        """h_a for each modulus: shape (B or 1, n, terms, order or 1).
+
+        ``pressure`` is the reading (n,), Pa: a law in the gauge's pressure is closed under a gauge
+        offset, and its constants are then not confounded with it.
+        """
+        P = pressure[None, :]
+        if self.name == "constant":
+            return np.ones((1, P.shape[1], 1, 1))
+        if self.name == "linear":
+            return np.stack([P, np.ones_like(P)], axis=-1)[..., None]
+        if self.name == "free":
+            hats = np.stack([np.interp(pressure, self.levels, row) for row in np.eye(len(self.levels))], -1)
+            known = level >= 0
+            hats[known] = np.eye(len(self.levels))[level[known]]
+            return hats[None, :, :, None]
+        if self.name == "exponential":
+            d, gap = values["d"], values["gap"]
+            return np.stack([_exp(d * P), _exp((d - gap) * P)], axis=-1)[..., None]
+        columns = []
+        for k in range(1, self.order + 1):
+            d, gap = values[f"d_{k}"], values[f"gap_{k}"]
+            columns.append(np.stack([_exp(d * P), _exp((d - gap) * P)], axis=-1))
+        return np.stack(columns, axis=-1)
+
+
+def _exp(x: Array) -> Array:
+    return np.exp(np.clip(x, -200.0, 200.0))
+
+
+@dataclass(frozen=True)
+class ModuliBlock:
+    """The linear block: a law, its prior mean and how its coordinates become coefficients.
+
+    Exactly one of two priors: in newtons on a reference grid (``grid`` = (pressure, contraction
+    columns)), or Gaussian on the coefficients themselves (``mean`` (q,), ``root`` (q, p)).
+    """
+
+    law: Law
+    scale: float
+    grid: tuple[Array, Array] | None = None
+    """(levels (l,) Pa, force per modulus on the grid's contractions (g, order))"""
+    mean: Array | None = None
+    root: Array | None = None
+    _cache: dict[str, Array] = field(default_factory=dict, compare=False, repr=False)
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates η."""
+        return self.law.terms * self.law.order if self.root is None else self.root.shape[1]
+
+    def transform(self, values: Values) -> tuple[Array, Array]:
+        """(mean (1, q), transform (B or 1, q, p)): coefficients = mean + transform·η."""
+        if self.root is not None and self.mean is not None:
+            return self.mean[None, :], self.root[None, :, :]
+        fixed = self.law.name in ("constant", "linear", "free")
+        if fixed and "transform" in self._cache:
+            matrix = self._cache["transform"]
+        else:
+            matrix = self._newton_transform(values)
+            if fixed:
+                self._cache["transform"] = matrix
+        return np.zeros((1, matrix.shape[1])), matrix
+
+    def _newton_transform(self, values: Values) -> Array:
+        assert self.grid is not None
+        levels, columns = self.grid
+        index = np.arange(len(levels)) if self.law.name == "free" else np.full(len(levels), -1)
+        h = self.law.basis(levels, index, values)
+        # Columns of the whole grid in the block's order (term major, modulus minor).
+        full = h[:, :, None, :, :] * columns[None, None, :, None, :]
+        full = full.reshape(h.shape[0], len(levels) * len(columns), -1)
+        norm = np.linalg.norm(full, axis=1, keepdims=True)
+        norm[norm == 0.0] = 1.0
+        R = np.asarray(np.linalg.qr(full / norm, mode="r"))
+        p = full.shape[2]
+        points = full.shape[1]
+        inverse = np.linalg.solve(R, np.broadcast_to(np.eye(p), R.shape))
+        result: Array = self.scale * np.sqrt(points / p) * inverse / np.swapaxes(norm, 1, 2)
+        return result
+
+    def columns(
+        self, pressure: Array, level: Ints, per_modulus: Array, values: Values
+    ) -> tuple[Array, Array]:
+        """Force without the data's say and per coordinate: (B, n), (B, n, p).
+
+        ``per_modulus`` (B, n, order) is the force per unit of each modulus.
+        """
+        h = self.law.basis(pressure, level, values)
+        natural = h * per_modulus[:, :, None, :]
+        natural = natural.reshape(*natural.shape[:2], -1)
+        mean, matrix = self.transform(values)
+        fixed = natural @ mean[0] if self.mean is not None else np.zeros(natural.shape[:2])
+        return fixed, natural @ matrix
+
+    def coefficients(self, eta: Array, values: Values) -> Array:
+        """Coefficients (B, q) of coordinates (B, p)."""
+        mean, matrix = self.transform(values)
+        result: Array = mean + np.einsum(
+            "bqp,bp->bq", np.broadcast_to(matrix, (len(eta), *matrix.shape[1:])), eta
+        )
+        return result

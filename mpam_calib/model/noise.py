@@ -1,0 +1,26 @@
+"""Sensor noise: white, and a part that is correlated along time for much less than a stroke."""
+
+from __future__ import annotations
+
+from mpam_calib.model.priors import LogNormal, LogUniform, Parameter
+from mpam_calib.model.state import Setting
+
+WHITE, CORRELATED, TIME = "noise_sd_N", "noise_corr_sd_N", "noise_corr_time_s"
+
+
+def white_noise_parameter(setting: Setting) -> Parameter:
+    """Standard deviation of one reading: around the declared one, else around 0.3 % of the force scale."""
+    if setting.force_sd is not None:
+        prior = LogNormal(setting.force_sd, 0.7)
+    else:
+        prior = LogNormal(0.003 * setting.force_scale, 1.5)
+    return Parameter(WHITE, prior, "white noise of one force reading")
+
+
+def correlated_noise_parameters(setting: Setting, stroke_time: float) -> tuple[Parameter, ...]:
+    """An Ornstein-Uhlenbeck part; its time constant lies well below a stroke (longer is structure)."""
+    median = 0.3 * (setting.force_sd or 0.003 * setting.force_scale)
+    return (
+        Parameter(CORRELATED, LogNormal(median, 1.0), "noise that lasts for a moment"),
+        Parameter(TIME, LogUniform(stroke_time / 5000.0, stroke_time / 30.0), "how long that moment is"),
+    )

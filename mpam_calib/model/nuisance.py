@@ -1,0 +1,42 @@
+"""Declared uncertainties of geometry and gauge: parameters that widen the bands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mpam_calib.model.effect import Values
+from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.state import Setting, State
+from mpam_calib.units import si_factor
+
+GEOMETRY = {"L0_mm": "L0", "R0_mm": "R0", "t0_mm": "t0", "alpha0_deg": "alpha0"}
+BIAS = "pressure_bias_kPa"
+
+
+def nuisance_parameters(setting: Setting) -> tuple[Parameter, ...]:
+    """One parameter for each declared sd above zero: the geometry's values, the gauge's offset."""
+    parameters = []
+    for name, attribute in GEOMETRY.items():
+        sd = getattr(setting.geometry.sd, name) * si_factor(name)
+        matching = name == "alpha0_deg" and "braid_angle" in setting.simulation.effects
+        if sd > 0.0 and not matching:
+            prior = Normal(getattr(setting.geometry, attribute), sd)
+            parameters.append(Parameter(name, prior, "declared, uncertain", "specimen.toml"))
+    if setting.pressure_bias_sd > 0.0:
+        prior = Normal(0.0, setting.pressure_bias_sd)
+        parameters.append(Parameter(BIAS, prior, "true pressure minus the gauge's reading", "specimen.toml"))
+    return tuple(parameters)
+
+
+def apply_nuisances(state: State, values: Values) -> State:
+    """Put the sampled geometry and gauge offset in place of the declared ones."""
+    changed = {attribute: values[name] for name, attribute in GEOMETRY.items() if name in values}
+    # A sampled wall must stay inside its tube, or no shape exists.
+    rest = state.rest._replace(**changed)
+    rest = rest._replace(t0=np.minimum(rest.t0, 0.999 * rest.R0))
+    state = replace(state, rest=rest)
+    if BIAS in values:
+        state = replace(state, pressure=np.maximum(state.pressure + values[BIAS], 0.0))
+    return state

@@ -1,0 +1,214 @@
+"""Normalised priors, each the image of a standard normal: x = g(u), u ~ N(0, 1).
+
+The sampler walks in u, where every prior is the same and no parameter has a bound.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+Array = NDArray[np.float64]
+
+_FAR = 8.0
+"""|u| beyond which a bounded prior is numerically at its bound."""
+
+
+class Prior(Protocol):
+    """A one-dimensional prior. All methods are vectorised."""
+
+    def from_normal(self, u: Array) -> Array:
+        """The value whose standard-normal image is u."""
+
+    def to_normal(self, x: Array) -> Array:
+        """The standard-normal image of the value x (inside the support)."""
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation."""
+
+    def describe(self, factor: float = 1.0) -> str:
+        """One phrase, with values divided by ``factor`` (the SI size of the printed unit)."""
+
+
+@dataclass(frozen=True)
+class Normal:
+    """N(mean, sd²)."""
+
+    mean: float
+    scale: float
+
+    def from_normal(self, u: Array) -> Array:
+        """mean + scale·u."""
+        return self.mean + self.scale * u
+
+    def to_normal(self, x: Array) -> Array:
+        """(x − mean)/scale."""
+        return (x - self.mean) / self.scale
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation."""
+        return self.scale
+
+    def describe(self, factor: float = 1.0) -> str:
+        """One phrase."""
+        return f"normal({self.mean / factor:.4g}, sd {self.scale / factor:.4g})"
+
+
+@dataclass(frozen=True)
+class BelowNormal:
+    """N(mean, scale²) given that the value is below ``high``."""
+
+    mean: float
+    scale: float
+    high: float
+
+    @property
+    def _share(self) -> float:
+        return float(special.ndtr((self.high - self.mean) / self.scale))
+
+    def from_normal(self, u: Array) -> Array:
+        """The value at the share Φ(u) of what lies below ``high``."""
+        share = np.maximum(special.ndtr(np.clip(u, -37.0, _FAR)) * self._share, 1e-300)
+        return self.mean + self.scale * special.ndtri(share)
+
+    def to_normal(self, x: Array) -> Array:
+        """Inverse of :meth:`from_normal`."""
+        share = special.ndtr((np.asarray(x) - self.mean) / self.scale) / self._share
+        return special.ndtri(np.minimum(share, 1.0 - 1e-15))
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation."""
+        b = (self.high - self.mean) / self.scale
+        ratio = float(np.exp(-0.5 * b**2) / np.sqrt(2.0 * np.pi)) / self._share
+        return float(self.scale * np.sqrt(1.0 - b * ratio - ratio**2))
+
+    def describe(self, factor: float = 1.0) -> str:
+        """One phrase."""
+        return (
+            f"normal({self.mean / factor:.4g}, sd {self.scale / factor:.4g}) below {self.high / factor:.4g}"
+        )
+
+
+@dataclass(frozen=True)
+class LogNormal:
+    """ln x ~ N(ln median, log_sd²)."""
+
+    median: float
+    log_sd: float
+
+    def from_normal(self, u: Array) -> Array:
+        """median·exp(log_sd·u)."""
+        return self.median * np.exp(self.log_sd * np.clip(u, -40.0, 40.0))
+
+    def to_normal(self, x: Array) -> Array:
+        """ln(x/median)/log_sd."""
+        return np.log(x / self.median) / self.log_sd
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation."""
+        s2 = self.log_sd**2
+        return float(self.median * np.exp(s2 / 2.0) * np.sqrt(np.expm1(s2)))
+
+    def describe(self, factor: float = 1.0) -> str:
+        """One phrase."""
+        return f"log-normal(median {self.median / factor:.4g}, factor e^±{self.log_sd:.3g})"
+
+
+@dataclass(frozen=True)
+class HalfNormal:
+    """|N(0, scale²)|."""
+
+    scale: float
+
+    def from_normal(self, u: Array) -> Array:
+        """The value with the same upper-tail probability (accurate in both tails)."""
+        return -self.scale * special.ndtri(special.ndtr(-np.clip(u, -_FAR, 37.0)) / 2.0)
+
+    def to_normal(self, x: Array) -> Array:
+        """Inverse of :meth:`from_normal`."""
+        return -special.ndtri(np.clip(2.0 * special.ndtr(-np.asarray(x) / self.scale), 1e-300, 1.0 - 1e-15))
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation."""
+        return float(self.scale * np.sqrt(1.0 - 2.0 / np.pi))
+
+    def describe(self, factor: float = 1.0) -> str:
+        """One phrase."""
+        return f"half-normal(scale {self.scale / factor:.4g})"
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Uniform on (low, high)."""
+
+    low: float
+    high: float
+
+    def from_normal(self, u: Array) -> Array:
+        """low + (high − low)·Φ(u)."""
+        return self.low + (self.high - self.low) * special.ndtr(np.clip(u, -_FAR, _FAR))
+
+    def to_normal(self, x: Array) -> Array:
+        """Φ⁻¹ of the relative position."""
+        return special.ndtri((np.asarray(x) - self.low) / (self.high - self.low))
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation."""
+        return (self.high - self.low) / float(np.sqrt(12.0))
+
+    def describe(self, factor: float = 1.0) -> str:
+        """One phrase."""
+        return f"uniform({self.low / factor:.4g} … {self.high / factor:.4g})"
+
+
+@dataclass(frozen=True)
+class LogUniform:
+    """ln x uniform between the logarithms of low and high."""
+
+    low: float
+    high: float
+
+    @property
+    def _log(self) -> Uniform:
+        return Uniform(float(np.log(self.low)), float(np.log(self.high)))
+
+    def from_normal(self, u: Array) -> Array:
+        """low·(high/low)^Φ(u)."""
+        return np.exp(self._log.from_normal(u))
+
+    def to_normal(self, x: Array) -> Array:
+        """Φ⁻¹ of the relative position of the logarithm."""
+        return self._log.to_normal(np.log(x))
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation."""
+        span = np.log(self.high / self.low)
+        mean = (self.high - self.low) / span
+        return float(np.sqrt((self.high**2 - self.low**2) / (2.0 * span) - mean**2))
+
+    def describe(self, factor: float = 1.0) -> str:
+        """One phrase."""
+        return f"log-uniform({self.low / factor:.4g} … {self.high / factor:.4g})"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A sampled quantity: its name (which ends in its lab unit), its prior in SI units, and what it is."""
+
+    name: str
+    prior: Prior
+    meaning: str
+    source: str = ""
+    unit: str | None = None
+    """Printed unit where the name does not carry it."""

@@ -1,0 +1,74 @@
+"""What a model is asked about: a row of readings, whether measured or imagined, in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Rows (n,) that a force is wanted for.
+
+    ``sign`` is s: +1 loading, −1 unloading, 0 neither; ``level`` is −1 where no level is meant;
+    ``time`` runs over the whole test and ``time_at_level`` since the level was reached (s);
+    ``cycle`` counts from 1 within a level; ``travel`` is the distance since the last reversal (m)
+    and ``reversal`` 0 on a stroke that no reversal began; ``speed`` in m/s (0: at rest).
+    """
+
+    pressure: Array
+    displacement: Array
+    sign: Array
+    level: Ints
+    time: Array
+    time_at_level: Array
+    cycle: Array
+    travel: Array
+    reversal: Array
+    speed: Array
+
+    def __len__(self) -> int:
+        return len(self.pressure)
+
+    def take(self, index: NDArray[np.generic] | slice) -> Readings:
+        """The rows picked by an index, a mask or a slice."""
+        return Readings(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+    @staticmethod
+    def join(parts: list[Readings]) -> Readings:
+        """One set of rows out of several."""
+        return Readings(
+            **{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Readings)}
+        )
+
+    @staticmethod
+    def at_rest(pressure: Array, displacement: Array, sign: Array | float = 0.0) -> Readings:
+        """Rows without a history: settled after many cycles, far from a reversal, no clock.
+
+        ``pressure`` (Pa), ``displacement`` (m) and ``sign`` broadcast together to shape (n,).
+        """
+        p, x, s = (np.asarray(v, dtype=np.float64) for v in np.broadcast_arrays(pressure, displacement, sign))
+        zero = np.zeros(p.shape)
+        return Readings(
+            pressure=p,
+            displacement=x,
+            sign=s,
+            level=np.full(p.shape, -1, dtype=np.int64),
+            time=zero,
+            time_at_level=zero,
+            cycle=zero + SETTLED,
+            travel=zero + FAR,
+            reversal=zero,
+            speed=zero,
+        )
+
+
+SETTLED = 1e6
+"""Cycle count that stands for "after many cycles"."""
+FAR = 1e3
+"""Distance (m) that stands for "far from the last reversal"."""

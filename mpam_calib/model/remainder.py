@@ -1,0 +1,83 @@
+"""The remainder: what the declared physics leaves, as a smooth surface of inferred, a priori small size.
+
+δ(contraction, pressure, branch) = amplitude · Σ w_i φ_i η_i with η ~ N(0, I): half-waves along the
+contraction × Legendre polynomials in pressure × {both branches alike, branches apart}, weights falling
+with the wave number. A second, rougher part belongs to each stroke alone (:mod:`mpam_calib.posterior.bins`
+carries its kernel); together they keep the bands honest where the model is wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.priors import LogNormal, Parameter
+from mpam_calib.model.readings import Readings
+from mpam_calib.model.reference import geometric_contraction
+from mpam_calib.model.state import Setting
+
+Array = NDArray[np.float64]
+
+HALF_WAVES, PRESSURE_DEGREE, KEPT = 8, 3, 40
+MARGIN = 1.25
+"""The half-waves span this multiple of the geometric contraction, so that the edge is not special."""
+SMOOTH, ROUGH = "remainder_sd_N", "stroke_remainder_sd_N"
+
+
+def remainder_parameters(setting: Setting, strokes: bool) -> tuple[Parameter, ...]:
+    """Amplitudes (N): a priori half a percent of the force scale, and less for a single stroke."""
+    scale = setting.force_scale
+    found = [Parameter(SMOOTH, LogNormal(0.005 * scale, 1.0), "size of what the physics leaves")]
+    if strokes:
+        found.append(Parameter(ROUGH, LogNormal(0.002 * scale, 1.0), "the same, for one stroke alone"))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """The low-rank basis for one specimen (fixed: it depends on the declaration and its levels only)."""
+
+    geometry_length: float
+    span: float
+    top_pressure: float
+    index: NDArray[np.int64]
+    """(k, 3): half-wave number, pressure degree, branch part (0 alike, 1 apart)"""
+    weights: Array
+
+    @staticmethod
+    def build(setting: Setting, branches: bool) -> Remainder:
+        """The basis for a setting; ``branches`` where rows have a branch at all."""
+        degrees = min(PRESSURE_DEGREE, len(setting.levels) - 1) + 1
+        grid = np.stack(
+            np.meshgrid(np.arange(HALF_WAVES), np.arange(degrees), np.arange(1 + branches), indexing="ij"), -1
+        ).reshape(-1, 3)
+        weights = 1.0 / ((1.0 + grid[:, 0]) * (1.0 + grid[:, 1]) * (1.0 + grid[:, 2]))
+        kept = np.argsort(-weights, kind="stable")[:KEPT]
+        grid, weights = grid[kept], weights[kept]
+        # Mean square over the span is amplitude²: cos² averages 1/2, Legendre l averages 1/(2l + 1).
+        power = weights**2 * np.where(grid[:, 0] > 0, 0.5, 1.0) / (2.0 * grid[:, 1] + 1.0)
+        return Remainder(
+            setting.geometry.L0,
+            MARGIN * geometric_contraction(setting.geometry),
+            setting.top_pressure,
+            grid,
+            weights / np.sqrt(power.sum()),
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of basis functions."""
+        return len(self.weights)
+
+    def columns(self, readings: Readings) -> Array:
+        """Basis at the readings, (n, k), for amplitude 1 N."""
+        gamma = readings.displacement / self.geometry_length / self.span
+        # Beyond the highest level a polynomial would run away; there it stays what it was at the edge.
+        P = np.clip(2.0 * readings.pressure / self.top_pressure - 1.0, -1.0, 1.0)
+        waves = np.cos(np.pi * self.index[:, 0] * gamma[:, None])
+        legendre = np.polynomial.legendre.legvander(P, int(self.index[:, 1].max()))[:, self.index[:, 1]]
+        side = np.where(self.index[:, 2] == 1, readings.sign[:, None], 1.0)
+        result: Array = waves * legendre * side * self.weights
+        return result

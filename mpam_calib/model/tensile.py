@@ -1,0 +1,61 @@
+"""The bladder material's tensile test: stress as the same polynomial in the same moduli (thesis Eq. 4.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.priors import LogNormal, Parameter
+
+Array = NDArray[np.float64]
+
+NOISE, MISFIT = "tensile_noise_sd_Pa", "tensile_remainder_sd_Pa"
+STRESS_SCALE = 1e6
+"""Pa at a strain of one, as the prior's scale: above every silicone rubber of the soft-robotics
+materials database (Marechal et al. 2020, doi 10.1089/soro.2019.0115)."""
+HALF_WAVES = 12
+GRID_POINTS = 32
+
+
+@dataclass(frozen=True)
+class TensileModel:
+    """σ(ε) = Σ E_k e^k + remainder, on a declared range of engineering strain (low, high).
+
+    e is the strain or the stretch 1 + ε, as the simulation declares.
+    """
+
+    low: float
+    high: float
+    order: int
+    convention: str
+
+    def powers(self, strain: Array) -> Array:
+        """Stress per unit of each modulus, (n, order)."""
+        e = strain if self.convention == "engineering" else 1.0 + strain
+        return e[:, None] ** np.arange(1, self.order + 1)
+
+    def grid(self) -> Array:
+        """Columns on the reference grid of strains, (GRID_POINTS, order)."""
+        return self.powers(np.linspace(self.low, self.high, GRID_POINTS))
+
+    @property
+    def scale(self) -> float:
+        """Prior root mean square of the stress on the grid, Pa."""
+        return STRESS_SCALE * float(np.sqrt(np.mean(np.linspace(self.low, self.high, GRID_POINTS) ** 2)))
+
+    def remainder(self, strain: Array) -> Array:
+        """Half-waves along the strain range for amplitude 1 Pa, (n, HALF_WAVES), falling weights."""
+        j = np.arange(HALF_WAVES)
+        weights = 1.0 / (1.0 + j)
+        weights /= np.sqrt(np.sum(weights**2 * np.where(j > 0, 0.5, 1.0)))
+        position = (strain - self.low) / (self.high - self.low)
+        return np.asarray(np.cos(np.pi * j * position[:, None]) * weights)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Noise and remainder amplitude, Pa."""
+        return (
+            Parameter(NOISE, LogNormal(0.002 * self.scale, 2.0), "noise of one stress reading"),
+            Parameter(MISFIT, LogNormal(0.005 * self.scale, 2.0), "what the polynomial leaves of the stress"),
+        )

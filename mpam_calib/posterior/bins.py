@@ -1,0 +1,189 @@
+"""Loops reduced before sampling: bins along each stroke, and the scatter inside them.
+
+A stroke of thousands of readings becomes at most :data:`BINS` bins. The force of a bin is the mean of
+the model's force at two Gauss points (mean displacement ± its spread), exact to third order in the
+bin's width. What the bins lose, the fast scatter inside them, knows only the sensor's noise and is
+kept as one scatter matrix; so the sampler's cost does not depend on the number of readings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.readings import Readings
+from mpam_calib.specimen.recording import Loops
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+BINS = 32
+FINE = np.array([0.25, 0.5, 0.75, 1.0, 1.5, 2.0])
+"""The first bins of a stroke are divided further: friction turns over there."""
+UNREDUCED = 16
+"""Strokes of up to so many readings are left as they are."""
+CHUNK = 32
+"""At most so many consecutive readings of a bin tell of the fast noise."""
+SLACK_SHARE = 0.2
+"""A bin with this share of its readings at or below the floor says "slack", not a value."""
+
+
+@dataclass(frozen=True)
+class LoopBins:
+    """Bins (n,) in time order, in segments of one stroke each.
+
+    ``readings`` holds the 2n Gauss points (all lower ones, then all upper ones); ``force`` the mean
+    reading (N); ``count`` its number of rows; ``segment`` and ``position`` place a bin in the padded
+    (segments, width) layout; ``start``, ``stop`` (s) are its first and last row's times and ``dt``
+    (segments,) the time between rows; ``slack`` marks bins at the floor. ``scatter`` is
+    (Σ c cᵀ over chunks, their number, the contrast matrix Q, dt) of the detrended fast residuals, or None.
+    """
+
+    readings: Readings
+    force: Array
+    count: Array
+    segment: Ints
+    position: Ints
+    start: Array
+    stop: Array
+    dt: Array
+    slack: NDArray[np.bool_]
+    contraction_scale: float
+    scatter: tuple[Array, int, Array, float] | None
+    averaged: int
+
+    def __len__(self) -> int:
+        return len(self.force)
+
+    @property
+    def segments(self) -> int:
+        """Number of strokes."""
+        return len(self.dt)
+
+    @property
+    def width(self) -> int:
+        """Bins of the longest stroke."""
+        return int(self.position.max()) + 1
+
+    def middle(self) -> Readings:
+        """One reading per bin, at its mean."""
+        n = len(self)
+        low, high = self.readings.take(slice(0, n)), self.readings.take(slice(n, None))
+        both = {name: 0.5 * (getattr(low, name) + getattr(high, name)) for name in ("displacement", "travel")}
+        return Readings(**{**low.__dict__, **both})
+
+
+def _edges(rows: int) -> Ints:
+    """First rows of the bins of a stroke of ``rows`` readings."""
+    if rows <= UNREDUCED:
+        return np.arange(rows)
+    bins = min(BINS, max(UNREDUCED, rows // 4))
+    fractions = np.arange(bins, dtype=np.float64)
+    if rows >= 8 * bins:
+        fractions = np.concatenate([[0.0], FINE, fractions[3:]])
+    return np.unique(np.round(fractions / bins * rows).astype(np.int64))
+
+
+def bin_loops(loops: Loops) -> LoopBins:
+    """Reduce loops to bins (rows in time order)."""
+    stroke_starts = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
+    lengths = np.diff(np.append(stroke_starts, len(loops.stroke)))
+    per_stroke = [_edges(int(n)) for n in lengths]
+    starts = np.concatenate([s + e for s, e in zip(stroke_starts, per_stroke, strict=True)])
+    segment = np.repeat(np.arange(len(lengths)), [len(e) for e in per_stroke])
+    position = np.concatenate([np.arange(len(e)) for e in per_stroke])
+    stops = np.append(starts[1:], len(loops.force_N))
+    count = (stops - starts).astype(np.float64)
+
+    def mean(x: Array) -> Array:
+        return np.asarray(np.add.reduceat(x, starts) / count)
+
+    displacement = mean(loops.displacement_m)
+    row_bin = np.repeat(np.arange(len(starts)), stops - starts)
+    spread = np.sqrt(mean((loops.displacement_m - displacement[row_bin]) ** 2))
+    direction = np.where(loops.branch[starts] == -1, 1.0, -1.0)
+    travel, reversal, speed, at_level = _history(loops, stroke_starts, lengths)
+    bin_travel = mean(travel)
+    force = mean(loops.force_N)
+    common = {
+        "pressure": mean(loops.pressure_Pa),
+        "sign": np.where(np.abs(loops.branch[starts]) == 1, loops.branch[starts], 0).astype(np.float64),
+        "level": loops.level[starts],
+        "time": mean(loops.time_s),
+        "time_at_level": mean(at_level),
+        "cycle": loops.cycle[starts].astype(np.float64),
+        "reversal": reversal[segment],
+        "speed": speed[segment],
+    }
+    halves = [
+        Readings(
+            displacement=displacement + side * direction * spread,
+            travel=np.maximum(bin_travel + side * spread, 0.0),
+            **common,
+        )
+        for side in (-1.0, 1.0)
+    ]
+    ends = stroke_starts + lengths - 1
+    dt = (loops.time_s[ends] - loops.time_s[stroke_starts]) / np.maximum(lengths - 1, 1)
+    return LoopBins(
+        readings=Readings.join(halves),
+        force=force,
+        count=count,
+        segment=segment,
+        position=position,
+        start=loops.time_s[starts],
+        stop=loops.time_s[stops - 1],
+        dt=np.maximum(dt, 1e-9),
+        slack=mean(loops.censored.astype(np.float64)) >= SLACK_SHARE,
+        contraction_scale=float(np.ptp(displacement)) or 1.0,
+        scatter=_scatter(loops, starts, stops, segment, position, dt),
+        averaged=loops.averaged,
+    )
+
+
+def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array, Array]:
+    """Travel since the stroke began (rows), whether a reversal began it, its speed, time at the level."""
+    segment = np.repeat(np.arange(len(first)), lengths)
+    travel = np.abs(loops.displacement_m - loops.displacement_m[first][segment])
+    same_level = np.zeros(len(first), dtype=bool)
+    same_level[1:] = (loops.level[first][1:] == loops.level[first][:-1]) & (
+        loops.clock[first][1:] == loops.clock[first][:-1]
+    )
+    opposite = np.zeros(len(first), dtype=bool)
+    opposite[1:] = loops.branch[first][1:] == -loops.branch[first][:-1]
+    last = first + lengths - 1
+    duration = np.maximum(loops.time_s[last] - loops.time_s[first], 1e-9)
+    # Net travel over time: encoder noise would inflate a sum of steps.
+    speed = np.abs(loops.displacement_m[last] - loops.displacement_m[first]) / duration
+    run = np.cumsum(~same_level) - 1
+    level_start = loops.time_s[first][~same_level]
+    at_level = loops.time_s - level_start[run][segment]
+    return travel, (same_level & opposite).astype(np.float64), speed, at_level
+
+
+def _scatter(
+    loops: Loops, starts: Ints, stops: Ints, segment: Ints, position: Ints, dt: Array
+) -> tuple[Array, int, Array, float] | None:
+    """Scatter matrix of detrended chunks of consecutive rows, one chunk from each regular bin."""
+    typical = float(np.median(dt))
+    rows = stops - starts
+    last = np.append(segment[1:] != segment[:-1], True)
+    # Bins next to a turn are left out: there the force itself is fast.
+    usable = (position >= len(FINE) + 1) & ~last & (np.abs(dt[segment] / typical - 1.0) < 0.1)
+    censored = np.add.reduceat(loops.censored.astype(np.float64), starts) > 0
+    usable &= (rows >= 4) & ~censored
+    if usable.sum() < 8:
+        return None
+    size = int(min(CHUNK, np.quantile(rows[usable], 0.1)))
+    if size < 4:
+        return None
+    usable &= rows >= size
+    chunks = loops.force_N[starts[usable][:, None] + np.arange(size)]
+    degree = 2 if size >= 6 else 1
+    basis = np.vander(np.linspace(-1.0, 1.0, size), degree + 1)
+    full, _ = np.linalg.qr(basis, mode="complete")
+    contrast = full[:, degree + 1 :]
+    projected = chunks @ contrast
+    return projected.T @ projected, int(usable.sum()), contrast, typical

@@ -1,0 +1,56 @@
+"""Has it converged? Rank-normalised R-hat across ensembles, and the smaller of two effective sample sizes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+RHAT_LIMIT = 1.01
+ESS_WANTED = 400.0
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """Per parameter (d,): R-hat across ensembles, bulk and tail ESS of all draws together."""
+
+    rhat: Array
+    ess_bulk: Array
+    ess_tail: Array
+
+    @property
+    def converged(self) -> bool:
+        """R-hat and both ESS within their limits for every parameter."""
+        return bool(
+            np.all(self.rhat <= RHAT_LIMIT)
+            and np.all(self.ess_bulk >= ESS_WANTED)
+            and np.all(self.ess_tail >= ESS_WANTED)
+        )
+
+
+def diagnose_chains(chains: Array) -> Diagnostics:
+    """Diagnostics of chains (ensembles, steps, walkers, d).
+
+    R-hat takes each ensemble as one chain: walkers of one ensemble lean on each other, so that
+    R-hat over walkers would be content with all of them in a wrong mode. ESS is the smaller of
+    ArviZ's with each walker a chain (time must not be interleaved) and emcee's N/τ.
+    """
+    import arviz as az
+    from emcee.autocorr import integrated_time
+
+    E, T, W, d = chains.shape
+    rhat, bulk, tail = np.empty(d), np.empty(d), np.empty(d)
+    for i in range(d):
+        x = chains[..., i]
+        rhat[i] = az.rhat(x.reshape(E, T * W))
+        separate = np.moveaxis(x, 2, 1).reshape(E * W, T)
+        total = float(E * T * W)
+        # A block that is shorter than τ cannot show it; τ is at least what the ensembles show apart.
+        tau = max(float(integrated_time(x[e][..., None], quiet=True, tol=0)[0]) for e in range(E))
+        limit = total / max(tau, 1.0)
+        bulk[i] = min(float(az.ess(separate, method="bulk")), limit)
+        tail[i] = min(float(az.ess(separate, method="tail")), limit)
+    return Diagnostics(rhat, bulk, tail)

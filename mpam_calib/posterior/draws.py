@@ -1,0 +1,129 @@
+"""Kept posterior draws: sampled values, the linear coordinates drawn back, the thesis's coefficients."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.model import Model
+from mpam_calib.posterior.collapsed import Collapsed
+from mpam_calib.posterior.mode import BATCH
+from mpam_calib.posterior.sampling import Sampling
+from mpam_calib.units import KPA, si_factor, unit_of
+
+Array = NDArray[np.float64]
+
+KEPT = 1000
+"""Draws kept of each ensemble."""
+
+
+@dataclass(frozen=True)
+class Draws:
+    """N draws, ensemble by ensemble: ``u`` (N, d) coordinates, ``values`` name → (N, 1) SI, ``eta`` (N, k).
+
+    ``chains`` is the number of ensembles; N is a multiple of it.
+    """
+
+    u: Array
+    values: dict[str, Array]
+    eta: Array
+    chains: int
+
+    def __len__(self) -> int:
+        return len(self.u)
+
+    def thin(self, count: int) -> Draws:
+        """At most ``count`` draws, evenly spaced."""
+        if count >= len(self):
+            return self
+        keep = np.linspace(0, len(self) - 1, count).astype(np.int64)
+        return Draws(self.u[keep], {k: v[keep] for k, v in self.values.items()}, self.eta[keep], 1)
+
+
+def keep_draws(target: Collapsed, sampling: Sampling, seed: int) -> Draws:
+    """Evenly spaced draws of every ensemble, with η drawn from its exact conditional for each."""
+    E, T, W, d = sampling.chain.shape
+    keep = np.unique(np.linspace(0, T * W - 1, KEPT).astype(np.int64))
+    u = sampling.chain.reshape(E, T * W, d)[:, keep].reshape(-1, d)
+    rng = np.random.default_rng([seed, 1])
+    values = target.model.values(u)
+    eta = np.concatenate(
+        [
+            target.linear_draws({k: v[i : i + BATCH] for k, v in values.items()}, rng)
+            for i in range(0, len(u), BATCH)
+        ]
+    )
+    return Draws(u, values, eta, E)
+
+
+@dataclass(frozen=True)
+class Reported:
+    """A quantity as it is printed: its name, unit, draws (N,) in that unit, and its prior's sd."""
+
+    name: str
+    unit: str
+    draws: Array
+    prior_sd: float
+    sampled: bool
+
+
+def reported(model: Model, draws: Draws, seed: int = 0) -> list[Reported]:
+    """Everything ``summary.csv`` lists, in lab units: coefficients of the law first."""
+    found = _coefficients(model, draws, seed)
+    for parameter in model.parameters:
+        name = parameter.name
+        factor = si_factor(name)
+        if name.split("_")[0] in ("d", "gap") and parameter.unit == "1/kPa":
+            found += _rate(model, draws, name, seed)
+            continue
+        unit = unit_of(name) if parameter.unit is None else parameter.unit
+        found.append(
+            Reported(name, unit, draws.values[name][:, 0] / factor, parameter.prior.sd / factor, True)
+        )
+    return found
+
+
+def _coefficients(model: Model, draws: Draws, seed: int) -> list[Reported]:
+    if model.moduli is None:
+        return []
+    p = model.linear_sizes[0]
+    law = model.moduli.law
+    posterior = model.moduli.coefficients(draws.eta[:, :p], draws.values)
+    u, eta = _prior(model, seed)
+    prior = model.moduli.coefficients(eta, model.values(u)).std(axis=0)
+    return [
+        Reported(name, unit, posterior[:, i] / factor, float(prior[i] / factor), False)
+        for i, (name, (unit, factor)) in enumerate(
+            zip(law.coefficient_names(), law.coefficient_units(), strict=True)
+        )
+    ]
+
+
+def _rate(model: Model, draws: Draws, name: str, seed: int) -> list[Reported]:
+    """d as it is; in place of the gap, z = d − gap (thesis Eq. 4.8), both in 1/kPa."""
+    stem, _, order = name.partition("_")
+    other = f"d_{order}" if order else "d"
+    printed = name if stem == "d" else (f"z_{order}" if order else "z")
+    prior = model.values(_prior(model, seed)[0])
+
+    def rate(values: dict[str, Array]) -> Array:
+        return (values[name] if stem == "d" else values[other] - values[name])[:, 0] * KPA
+
+    return [Reported(printed, "1/kPa", rate(draws.values), float(rate(prior).std()), stem == "d")]
+
+
+def _prior(model: Model, seed: int, count: int = 2000) -> tuple[Array, Array]:
+    rng = np.random.default_rng([seed, 2])
+    u = rng.standard_normal((count, len(model.names)))
+    return u, rng.standard_normal((count, model.linear_sizes[0]))
+
+
+def prior_draws(model: Model, names: list[str], seed: int) -> dict[str, Array]:
+    """Prior draws (lab units) of some reported names."""
+    u, eta = _prior(model, seed)
+    rng = np.random.default_rng([seed, 3])
+    full = np.concatenate([eta, rng.standard_normal((len(u), sum(model.linear_sizes[1:])))], axis=1)
+    listed = reported(model, Draws(u, model.values(u), full, 1), seed)
+    return {item.name: item.draws for item in listed if item.name in names}

@@ -1,0 +1,96 @@
+"""Modes of the collapsed posterior and the curvature there, by batched finite differences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
+
+from mpam_calib.posterior.collapsed import Collapsed
+
+Array = NDArray[np.float64]
+
+GRADIENT_STEP = 2e-5
+BATCH = 64
+"""Parameter vectors evaluated at once: bounds the memory."""
+LOOSEST = 0.2
+"""Smallest precision that is believed; the prior's own is 1."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A local maximum: sampler coordinates (d,), log posterior there, covariance (d, d)."""
+
+    u: Array
+    log_posterior: float
+    covariance: Array
+
+    @property
+    def log_evidence(self) -> float:
+        """Laplace's approximation of the log evidence."""
+        _, log_det = np.linalg.slogdet(self.covariance)
+        return float(self.log_posterior + 0.5 * len(self.u) * np.log(2.0 * np.pi) + 0.5 * log_det)
+
+
+def evaluate(target: Collapsed, u: Array) -> Array:
+    """Log posterior (n,) in batches."""
+    parts = [target.log_posterior(u[i : i + BATCH]) for i in range(0, len(u), BATCH)]
+    return np.concatenate(parts)
+
+
+def climb(target: Collapsed, start: Array, steps: int = 200) -> tuple[Array, float]:
+    """BFGS from a start (d,): the point reached and its log posterior."""
+    d = len(start)
+    offsets = np.concatenate([np.zeros((1, d)), np.eye(d), -np.eye(d)]) * GRADIENT_STEP
+
+    def negative(u: Array) -> tuple[float, Array]:
+        f = evaluate(target, u + offsets)
+        if not np.all(np.isfinite(f)):
+            return 1e12, np.zeros(d)
+        return -float(f[0]), -(f[1 : d + 1] - f[d + 1 :]) / (2.0 * GRADIENT_STEP)
+
+    found = optimize.minimize(
+        negative, start, jac=True, method="BFGS", options={"maxiter": steps, "gtol": 1e-2}
+    )
+    return np.asarray(found.x), -float(found.fun)
+
+
+def curvature(target: Collapsed, u: Array, top: float) -> Array:
+    """Covariance (d, d) from the Hessian at a mode, with steps of about half a standard deviation."""
+    d = len(u)
+    step = np.full(d, 1e-3)
+    for _ in range(4):
+        f = evaluate(target, u + np.concatenate([np.diag(step), -np.diag(step)]))
+        drop = np.maximum(2.0 * top - f[:d] - f[d:], 1e-6)
+        step = np.clip(step * np.sqrt(0.25 / drop), step / 30.0, np.minimum(step * 30.0, 0.5))
+    i, j = np.triu_indices(d, 1)
+    e = np.diag(step)
+    corners = [u + si * e[i] + sj * e[j] for si, sj in ((1, 1), (-1, -1), (1, -1), (-1, 1))]
+    f = evaluate(target, np.concatenate([u + e, u - e, *corners]))
+    single = f[: 2 * d].reshape(2, d)
+    hessian = np.diag((single.sum(axis=0) - 2.0 * top) / step**2)
+    cross = f[2 * d :].reshape(4, -1)
+    hessian[i, j] = hessian[j, i] = (cross[0] + cross[1] - cross[2] - cross[3]) / (4.0 * step[i] * step[j])
+    values, vectors = np.linalg.eigh(-np.where(np.isfinite(hessian), hessian, 0.0))
+    covariance: Array = (vectors / np.maximum(values, LOOSEST)) @ vectors.T
+    return covariance
+
+
+def find_modes(target: Collapsed, rng: np.random.Generator, start: Array | None = None) -> list[Mode]:
+    """Distinct modes, best first: from the priors' centre (or a start) and the best of some prior draws."""
+    d = len(target.model.names)
+    draws = rng.standard_normal((32, d))
+    best = draws[np.argsort(-evaluate(target, draws))[:2]]
+    starts = [np.zeros(d) if start is None else start, *best]
+    found: list[Mode] = []
+    for point in starts:
+        u, top = climb(target, point)
+        covariance = curvature(target, u, top)
+        precision = np.linalg.inv(covariance)
+        if all((u - m.u) @ precision @ (u - m.u) > 4.0 * d for m in found):
+            found.append(Mode(u, top, covariance))
+    found.sort(key=lambda m: -m.log_posterior)
+    # Far below the best, a mode is a place where the climb got stuck.
+    return [mode for mode in found if mode.log_evidence > found[0].log_evidence - 15.0]

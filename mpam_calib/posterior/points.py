@@ -1,0 +1,93 @@
+"""Readings without a clock: force maps, blocked forces, free contractions, as one set of points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.readings import Readings
+from mpam_calib.specimen.recording import Specimen, Tensile
+
+Array = NDArray[np.float64]
+
+TENSILE_POINTS = 400
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points (n,): ``force`` in N; ``censored`` where only "at or below the floor" is known.
+
+    ``kind`` is 0 for a force map, 1 for a blocked force, 2 for a free contraction (a force of zero
+    at a measured contraction, whose own noise enters through the curve's slope).
+    """
+
+    readings: Readings
+    force: Array
+    censored: NDArray[np.bool_]
+    kind: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.force)
+
+
+KINDS = ("force_map", "blocked_force", "free_contraction")
+
+
+def gather_points(specimen: Specimen) -> Points | None:
+    """All points of a specimen, or None."""
+    if specimen.geometry is None:
+        return None
+    L0 = specimen.geometry.L0
+    readings: list[Readings] = []
+    force: list[Array] = []
+    censored: list[NDArray[np.bool_]] = []
+    kind: list[NDArray[np.int64]] = []
+
+    def add(rows: Readings, value: Array, slack: NDArray[np.bool_], which: int) -> None:
+        readings.append(rows)
+        force.append(value)
+        censored.append(slack)
+        kind.append(np.full(len(value), which))
+
+    if (grid := specimen.force_map) is not None:
+        sign = np.where(np.abs(grid.branch) == 1, grid.branch, 0).astype(np.float64)
+        rows = Readings.at_rest(grid.pressure_Pa, grid.contraction * L0, sign)
+        rows = Readings(**{**rows.__dict__, "level": grid.level})
+        add(rows, grid.force_N, grid.censored, 0)
+    if (blocked := specimen.blocked_force) is not None:
+        rows = Readings.at_rest(blocked.pressure_Pa, np.zeros_like(blocked.pressure_Pa))
+        add(rows, blocked.force_N, blocked.censored, 1)
+    if (free := specimen.free_contraction) is not None:
+        rows = Readings.at_rest(free.pressure_Pa, free.contraction * L0)
+        add(rows, np.zeros_like(free.contraction), np.zeros(len(free.contraction), dtype=bool), 2)
+    if not readings:
+        return None
+    return Points(
+        Readings.join(readings), np.concatenate(force), np.concatenate(censored), np.concatenate(kind)
+    )
+
+
+@dataclass(frozen=True)
+class TensilePoints:
+    """Stress-strain points (n,) in the declared range: strain, stress (Pa), rows behind each."""
+
+    strain: Array
+    stress: Array
+    count: Array
+
+
+def gather_tensile(tensile: Tensile, low: float, high: float) -> TensilePoints:
+    """The test's points within [low, high], averaged in order of strain where there are many."""
+    order = np.argsort(tensile.strain, kind="stable")
+    strain, stress = tensile.strain[order], tensile.stress_Pa[order]
+    inside = (strain >= low) & (strain <= high)
+    strain, stress = strain[inside], stress[inside]
+    starts = np.unique(
+        np.linspace(0, len(strain), min(len(strain), TENSILE_POINTS) + 1).astype(np.int64)[:-1]
+    )
+    count = np.diff(np.append(starts, len(strain))).astype(np.float64)
+    return TensilePoints(
+        np.add.reduceat(strain, starts) / count, np.add.reduceat(stress, starts) / count, count
+    )

@@ -1,0 +1,113 @@
+"""Draw until it has converged: warm-up, then blocks of all ensembles, with a state kept after each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.posterior.checkpoint import Checkpoint
+from mpam_calib.posterior.collapsed import Collapsed
+from mpam_calib.posterior.convergence import ESS_WANTED, Diagnostics, diagnose_chains
+from mpam_calib.posterior.ensembles import Block, EnsembleState, advance, start_states, workers
+from mpam_calib.posterior.mode import Mode
+from mpam_calib.posterior.proposal import StudentMixture
+from mpam_calib.posterior.warmup import WarmUp, laplace_mixture, warm_up
+
+Array = NDArray[np.float64]
+
+ENSEMBLES = 4
+BLOCK = 40
+MAX_STEPS = 4000
+"""Default budget of steps that count, for each ensemble."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a listener is told after each block: steps done, the worst figures, the share of the way."""
+
+    stage: str
+    steps: int
+    rhat: float
+    ess: float
+    share: float
+
+
+Listener = Callable[[Progress], None]
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Draws that count: chain (E, T, W, d) in sampler coordinates, log posterior (E, T, W)."""
+
+    chain: Array
+    log_prob: Array
+    diagnostics: Diagnostics
+    modes: list[Mode]
+    acceptance: float
+    warm_up_acceptance: list[float]
+
+    @property
+    def converged(self) -> bool:
+        """Whether every parameter met the limits."""
+        return self.diagnostics.converged
+
+
+def walkers_for(dimensions: int) -> int:
+    """Walkers of one ensemble: even, and several times the dimension."""
+    return max(32, 4 * dimensions + dimensions % 2)
+
+
+def sample(
+    target: Collapsed,
+    modes: list[Mode],
+    seed: int,
+    max_steps: int = MAX_STEPS,
+    ess_wanted: float = ESS_WANTED,
+    checkpoint: Checkpoint | None = None,
+    listener: Listener | None = None,
+) -> Sampling:
+    """Sample the target with at least four independent, over-dispersed ensembles.
+
+    Stops when R-hat across ensembles and both effective sample sizes meet their limits for every
+    parameter, or after ``max_steps`` steps of each ensemble. With a checkpoint, stored blocks are
+    taken over and the draws are those of an uninterrupted run.
+    """
+    tell = listener or (lambda progress: None)
+    seeds = [int(s.generate_state(1)[0]) for s in np.random.SeedSequence(seed).spawn(ENSEMBLES)]
+    blocks: list[list[Block]] = []
+    with workers(target, ENSEMBLES) as pool:
+
+        def run(states: list[EnsembleState], mixture: StudentMixture, steps: int) -> list[Block]:
+            return pool.map(advance, [(state, mixture, steps) for state in states], chunksize=1)
+
+        warm: WarmUp | None = checkpoint.load("warm_up") if checkpoint else None
+        if warm is None:
+            tell(Progress("warming up", 0, float("nan"), 0.0, 0.0))
+            start = start_states(target, laplace_mixture(modes), walkers_for(len(modes[0].u)), seeds)
+            warm = warm_up(target, modes, start, run)
+            if checkpoint:
+                checkpoint.save("warm_up", warm)
+        states = warm.states
+        while True:
+            name = f"block_{len(blocks):05d}"
+            block: list[Block] | None = checkpoint.load(name) if checkpoint else None
+            if block is None:
+                block = run(states, warm.mixture, BLOCK)
+                if checkpoint:
+                    checkpoint.save(name, block)
+            states = [b.state for b in block]
+            blocks.append(block)
+            chain = np.concatenate([np.stack([b.chain for b in part]) for part in blocks], axis=1)
+            figures = diagnose_chains(chain)
+            steps = chain.shape[1]
+            ess = float(min(figures.ess_bulk.min(), figures.ess_tail.min()))
+            tell(Progress("sampling", steps, float(figures.rhat.max()), ess, min(ess / ess_wanted, 1.0)))
+            enough = figures.converged and ess >= ess_wanted
+            if enough or steps + BLOCK > max_steps:
+                break
+    log_prob = np.concatenate([np.stack([b.log_prob for b in part]) for part in blocks], axis=1)
+    acceptance = float(np.mean([b.accepted for part in blocks for b in part]))
+    return Sampling(chain, log_prob, figures, warm.modes, acceptance, warm.accepted)

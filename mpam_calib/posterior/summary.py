@@ -1,0 +1,62 @@
+"""``summary.csv``: every parameter with its posterior, its prior's width and its convergence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from mpam_calib.posterior.convergence import RHAT_LIMIT
+from mpam_calib.posterior.draws import Reported
+from mpam_calib.posterior.sampling import Sampling
+
+COLUMNS = [
+    "parameter",
+    "unit",
+    "mean",
+    "sd",
+    "q05",
+    "q50",
+    "q95",
+    "prior_sd",
+    "rhat",
+    "ess_bulk",
+    "ess_tail",
+]
+
+
+def summarise(listed: list[Reported], names: tuple[str, ...], sampling: Sampling) -> pd.DataFrame:
+    """The table, one row per reported quantity.
+
+    A sampled parameter's R-hat and ESS are those of all its draws; what is computed from kept draws
+    (coefficients, z) is assessed on these, each ensemble one chain, and never credited with more
+    than the worst sampled parameter allows R-hat to hide.
+    """
+    import arviz as az
+
+    chains = sampling.chain.shape[0]
+    figures = sampling.diagnostics
+    rows = []
+    for item in listed:
+        x = item.draws
+        if item.name in names:
+            i = names.index(item.name)
+            state = (figures.rhat[i], figures.ess_bulk[i], figures.ess_tail[i])
+        else:
+            split = x.reshape(chains, -1)
+            flat = np.ptp(split) == 0.0
+            state = (
+                1.0 if flat else float(az.rhat(split)),
+                float(x.size) if flat else float(az.ess(split, method="bulk")),
+                float(x.size) if flat else float(az.ess(split, method="tail")),
+            )
+        q05, q50, q95 = np.quantile(x, [0.05, 0.5, 0.95])
+        rows.append([item.name, item.unit, x.mean(), x.std(ddof=1), q05, q50, q95, item.prior_sd, *state])
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def all_converged(summary: pd.DataFrame, sampling: Sampling, ess_wanted: float) -> bool:
+    """Whether every row meets the limits, the derived ones included."""
+    ess = summary[["ess_bulk", "ess_tail"]].to_numpy()
+    return bool(
+        sampling.converged and (summary["rhat"].to_numpy() <= RHAT_LIMIT).all() and (ess >= ess_wanted).all()
+    )

@@ -1,0 +1,103 @@
+"""From a specimen to the function that is sampled: reduced data, guide forces, modes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.model import MaterialPosterior, Model, Options, build_model
+from mpam_calib.model.readings import Readings
+from mpam_calib.model.remainder import SMOOTH
+from mpam_calib.posterior.bins import bin_loops
+from mpam_calib.posterior.collapsed import Collapsed, Data, Guide
+from mpam_calib.posterior.mode import Mode, find_modes
+from mpam_calib.posterior.points import gather_points, gather_tensile
+from mpam_calib.specimen.recording import Specimen
+
+Array = NDArray[np.float64]
+
+GUIDE_ROUNDS = 4
+GUIDE_TOLERANCE = 0.02
+"""Share of the noise by which a guide force may still move between rounds."""
+SLOPE_STEP = 1e-3
+"""Contraction step of the slope at a free contraction."""
+
+
+def build_target(
+    specimen: Specimen, options: Options | None = None, material: MaterialPosterior | None = None
+) -> Collapsed:
+    """The collapsed posterior of a specimen, before anything is known of the force."""
+    model = build_model(specimen, options, material)
+    tensile = None
+    if specimen.tensile is not None and model.tensile is not None:
+        tensile = gather_tensile(specimen.tensile, model.tensile.low, model.tensile.high)
+    floor = specimen.sensors.force_floor_N
+    data = Data(
+        bins=bin_loops(specimen.loops) if specimen.loops is not None and model.chain else None,
+        points=gather_points(specimen) if model.chain else None,
+        tensile=tensile,
+        floor=0.0 if floor is None else floor,
+    )
+    return Collapsed(model, data, Guide())
+
+
+def locate(target: Collapsed, rng: np.random.Generator) -> tuple[Collapsed, list[Mode]]:
+    """The target with settled guide forces, and its modes, best first.
+
+    What depends on the force itself (the sign in Coulomb's law, a fixture's give, the slope at a free
+    contraction) is fed with the model's force at the mode, until that no longer moves.
+    """
+    modes = find_modes(target, rng)
+    for _ in range(GUIDE_ROUNDS):
+        guide = _guide(target, modes[0].u)
+        if not _matters(target, guide):
+            break
+        target = replace(target, guide=guide)
+        modes = find_modes(target, rng, start=modes[0].u)
+    return target, modes
+
+
+def _guide(target: Collapsed, u: Array) -> Guide:
+    model, data = target.model, target.data
+    values = model.values(u[None])
+    eta = target.linear_mean(values)
+    bins = None if data.bins is None else predict_force(model, values, eta, data.bins.readings)[0]
+    if data.points is None or model.setting is None:
+        return Guide(bins)
+    rows = data.points.readings
+    step = SLOPE_STEP * model.setting.geometry.L0
+    shifted = [
+        predict_force(model, values, eta, replace(rows, displacement=rows.displacement + side * step))[0]
+        for side in (-1.0, 1.0)
+    ]
+    return Guide(bins, predict_force(model, values, eta, rows)[0], (shifted[1] - shifted[0]) / (2.0 * step))
+
+
+def _matters(target: Collapsed, guide: Guide) -> bool:
+    """Whether a new guide would change the terms."""
+    old, chain, data = target.guide, target.model.chain, target.data
+    if chain is None:
+        return False
+    signs = any(item is not None and bool(np.any(item < 0.0)) for item in (guide.bins, guide.points))
+    slopes = data.points is not None and bool(np.any(data.points.kind == 2))
+    if not (chain.uses_force or signs or slopes):
+        return False
+    setting = chain.setting
+    tolerance = GUIDE_TOLERANCE * (setting.force_sd or 0.003 * setting.force_scale)
+    pairs = [(guide.bins, old.bins), (guide.points, old.points)]
+    return any(
+        new is not None and (before is None or float(np.max(np.abs(new - before))) > tolerance)
+        for new, before in pairs
+    )
+
+
+def predict_force(model: Model, values: dict[str, Array], eta: Array, readings: Readings) -> Array:
+    """Force (B, n), N, with the smooth remainder, for values (B, 1) and coordinates η (B, k)."""
+    assert model.chain is not None
+    p, q, _ = model.linear_sizes
+    force = model.chain.force(values, eta[:, :p], readings)
+    if model.remainder is not None:
+        force = force + values[SMOOTH] * (eta[:, p : p + q] @ model.remainder.columns(readings).T)
+    return force

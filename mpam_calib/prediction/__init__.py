@@ -1,0 +1,1 @@
+"""What a posterior predicts: forces with bands, blocked force, free contraction, new recordings."""

@@ -1,0 +1,144 @@
+"""Credible bands as the tables ``bands.csv`` and ``predictions.csv``."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpam_calib.model.model import Model
+from mpam_calib.model.tensile import MISFIT, NOISE
+from mpam_calib.posterior.draws import Draws
+from mpam_calib.prediction.curves import BRANCHES, Curves, Reach, contraction_grid, first_root, force_curves
+from mpam_calib.specimen.recording import Specimen
+from mpam_calib.units import KPA
+
+Array = NDArray[np.float64]
+
+COLUMNS = [
+    "quantity",
+    "pressure_kPa",
+    "contraction",
+    "branch",
+    "mean",
+    "q05",
+    "q25",
+    "q50",
+    "q75",
+    "q95",
+    "extrapolated",
+]
+DRAWS = 2000
+QUANTILES = [0.05, 0.25, 0.5, 0.75, 0.95]
+STRESS_POINTS = 101
+
+
+def data_reach(specimen: Specimen) -> Reach:
+    """Where the muscle's data end, level by level."""
+    levels = specimen.levels_Pa
+    reach = np.zeros(len(levels))
+    assert specimen.geometry is not None
+    if (loops := specimen.loops) is not None:
+        np.maximum.at(reach, loops.level, loops.displacement_m / specimen.geometry.L0)
+    if (grid := specimen.force_map) is not None:
+        seen = ~grid.censored
+        np.maximum.at(reach, grid.level[seen], grid.contraction[seen])
+    if (free := specimen.free_contraction) is not None:
+        nearest = np.abs(free.pressure_Pa[:, None] - levels).argmin(axis=1)
+        np.maximum.at(reach, nearest, free.contraction)
+    return Reach(levels, reach)
+
+
+def muscle_bands(
+    model: Model, draws: Draws, specimen: Specimen, pressures: Array, seed: int, trim: bool = True
+) -> pd.DataFrame:
+    """Bands on force, blocked force and free contraction at pressures (Pa), each also ``_observed``.
+
+    Curves end at the first grid point at or beyond the mean free contraction (``trim``).
+    """
+    reach = data_reach(specimen)
+    grid = contraction_grid(model, float(reach.contraction.max()))
+    curves = force_curves(model, draws.thin(DRAWS), pressures, grid, seed)
+    rng = np.random.default_rng([seed, 5])
+    free = first_root(grid, curves.force[:, :, 2])
+    outside = reach.outside(pressures)
+    limit = reach.at(pressures)
+    parts = []
+    for observed in (False, True):
+        noise = (
+            curves.noise[:, None, None] * rng.standard_normal(curves.force[:, :, 0].shape)
+            if observed
+            else 0.0
+        )
+        suffix = "_observed" if observed else ""
+        for j, branch in enumerate(BRANCHES):
+            far = grid[None, :] > limit[:, None] * 1.02 + 1e-3
+            table = _table(f"force_N{suffix}", pressures, grid, branch, curves.force[:, :, j] + noise)
+            table["extrapolated"] = (outside[:, None] | far).ravel()
+            if trim:
+                end = np.searchsorted(grid, free.mean(axis=0) - 1e-12)
+                table = table[(np.arange(len(grid))[None, :] <= end[:, None]).ravel()]
+            parts.append(table)
+        parts.append(_blocked(curves, suffix, rng, outside))
+        contraction = free
+        if observed:
+            contraction = free + curves.contraction_noise[:, None] * rng.standard_normal(free.shape)
+        table = _table(f"free_contraction{suffix}", pressures, np.zeros(1), "", contraction[:, :, None])
+        table["extrapolated"] = outside | (free.mean(axis=0) > limit * 1.02 + 1e-3)
+        parts.append(table.assign(contraction=np.nan))
+    return pd.concat(parts, ignore_index=True)[COLUMNS]
+
+
+def _blocked(
+    curves: Curves, suffix: str, rng: np.random.Generator, outside: NDArray[np.bool_]
+) -> pd.DataFrame:
+    blocked = curves.force[:, :, 2, 0]
+    if suffix:
+        blocked = blocked + curves.noise[:, None] * rng.standard_normal(blocked.shape)
+    table = _table(f"blocked_force_N{suffix}", curves.pressures, np.zeros(1), "", blocked[:, :, None])
+    table["extrapolated"] = outside
+    return table
+
+
+def stress_bands(model: Model, draws: Draws, seed: int) -> pd.DataFrame:
+    """Bands on engineering stress (Pa) over the declared strain range (in the column ``contraction``)."""
+    assert model.tensile is not None
+    strain = np.linspace(model.tensile.low, model.tensile.high, STRESS_POINTS)
+    thinned = draws.thin(DRAWS)
+    stress = stress_draws(model, thinned, strain)
+    rng = np.random.default_rng([seed, 6])
+    noisy = stress + thinned.values[NOISE] * rng.standard_normal(stress.shape)
+    parts = [
+        _table(name, np.zeros(1), strain, "", values[:, None, :])
+        for name, values in (("stress_Pa", stress), ("stress_Pa_observed", noisy))
+    ]
+    return pd.concat(parts, ignore_index=True).assign(extrapolated=False)[COLUMNS]
+
+
+def stress_draws(model: Model, draws: Draws, strain: Array, remainder: bool = True) -> Array:
+    """Stress (N, n), Pa, at strains (n,)."""
+    assert model.tensile is not None and model.moduli is not None
+    p, q, _ = model.linear_sizes
+    moduli = model.moduli.coefficients(draws.eta[:, :p], draws.values)
+    stress: Array = moduli @ model.tensile.powers(strain).T
+    if remainder and MISFIT in draws.values:
+        stress = stress + draws.values[MISFIT] * (draws.eta[:, p + q :] @ model.tensile.remainder(strain).T)
+    return stress
+
+
+def _table(quantity: str, pressures: Array, contractions: Array, branch: str, draws: Array) -> pd.DataFrame:
+    """Rows (pressure major) of draws (N, pressures, contractions)."""
+    flat = draws.reshape(len(draws), -1)
+    quantiles = np.quantile(flat, QUANTILES, axis=0)
+    pressure, contraction = np.meshgrid(pressures / KPA, contractions, indexing="ij")
+    return pd.DataFrame(
+        {
+            "quantity": quantity,
+            # A level is a median of readings: a hundredth of a kPa is all it means.
+            "pressure_kPa": np.round(pressure.ravel(), 3),
+            "contraction": np.round(contraction.ravel(), 9),
+            "branch": branch,
+            "mean": flat.mean(axis=0),
+            **{f"q{round(100 * q):02d}": values for q, values in zip(QUANTILES, quantiles, strict=True)},
+        }
+    )

@@ -1,0 +1,123 @@
+"""Draws of whole force-contraction curves, remainder included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.model import CONTRACTION_SD, Model
+from mpam_calib.model.noise import CORRELATED, WHITE
+from mpam_calib.model.readings import Readings
+from mpam_calib.model.reference import geometric_contraction
+from mpam_calib.model.remainder import ROUGH
+from mpam_calib.posterior.covariance import ROUGH_LENGTH
+from mpam_calib.posterior.draws import Draws
+from mpam_calib.posterior.target import predict_force
+
+Array = NDArray[np.float64]
+
+STEP = 0.005
+BRANCHES = ("loading", "unloading", "mean")
+BATCH_CELLS = 400_000
+"""Draws × readings evaluated at once: bounds the memory."""
+LIMIT = 0.6
+"""Largest contraction that is looked at."""
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Force draws, N: ``force`` (N, pressures, 3 branches, contractions), in the order of BRANCHES.
+
+    ``noise`` (N,) and ``contraction_noise`` (N,) are the sds of one new reading.
+    """
+
+    pressures: Array
+    contractions: Array
+    force: Array
+    noise: Array
+    contraction_noise: Array
+
+
+def contraction_grid(model: Model, reach: float) -> Array:
+    """0, 0.005, … a little beyond the braid's geometric limit and the data's reach."""
+    assert model.setting is not None
+    last = min(LIMIT, 1.1 * max(geometric_contraction(model.setting.geometry), reach))
+    return np.arange(int(np.ceil(last / STEP)) + 1, dtype=np.float64) * STEP
+
+
+def force_curves(model: Model, draws: Draws, pressures: Array, contractions: Array, seed: int) -> Curves:
+    """Curves at pressures (Pa, the gauge's reading) and contractions, for every draw.
+
+    The muscle is settled: after many cycles, just after the level was reached, at the reference speed.
+    """
+    assert model.setting is not None
+    L0 = model.setting.geometry.L0
+    shape = (len(pressures), len(BRANCHES), len(contractions))
+    sign = np.array([1.0, -1.0, 0.0])[None, :, None]
+    grid = np.broadcast_arrays(pressures[:, None, None], L0 * contractions[None, None, :], sign)
+    readings = Readings.at_rest(*(g.ravel() for g in grid))
+    parts = []
+    size = max(1, BATCH_CELLS // len(readings))
+    for i in range(0, len(draws), size):
+        values = {k: v[i : i + size] for k, v in draws.values.items()}
+        parts.append(predict_force(model, values, draws.eta[i : i + size], readings))
+    force = np.concatenate(parts).reshape(len(draws), *shape)
+    rng = np.random.default_rng([seed, 4])
+    if ROUGH in draws.values:
+        force = force + _stroke_remainder(model, draws, contractions, shape, rng)
+    zero = np.zeros(len(draws))
+    white = draws.values[WHITE][:, 0]
+    correlated = draws.values[CORRELATED][:, 0] if CORRELATED in draws.values else zero
+    own = draws.values[CONTRACTION_SD][:, 0] if CONTRACTION_SD in draws.values else zero
+    return Curves(pressures, contractions, force, np.hypot(white, correlated), own)
+
+
+def _stroke_remainder(
+    model: Model, draws: Draws, contractions: Array, shape: tuple[int, ...], rng: np.random.Generator
+) -> Array:
+    """A new stroke's own remainder: an exponential kernel along the contraction, apart for each branch."""
+    assert model.setting is not None
+    length = ROUGH_LENGTH * model.setting.stroke / model.setting.geometry.L0
+    rho = np.exp(-np.diff(contractions) / length)
+    z = rng.standard_normal((len(draws), shape[0], 2, shape[2]))
+    path = np.empty_like(z)
+    path[..., 0] = z[..., 0]
+    for i, r in enumerate(rho):
+        path[..., i + 1] = r * path[..., i] + np.sqrt(1.0 - r**2) * z[..., i + 1]
+    path *= draws.values[ROUGH][:, :, None, None]
+    return np.concatenate([path, path.mean(axis=2, keepdims=True)], axis=2)
+
+
+def first_root(contractions: Array, force: Array) -> Array:
+    """First root of curves (..., contractions): 0 where F(0) <= 0, the last contraction where there is none.
+
+    Linear between grid points.
+    """
+    below = force <= 0.0
+    index = np.where(below.any(axis=-1), below.argmax(axis=-1), -1)
+    after = np.clip(index, 1, None)[..., None]
+    high = np.take_along_axis(force, after - 1, axis=-1)[..., 0]
+    low = np.take_along_axis(force, after, axis=-1)[..., 0]
+    start, end = contractions[after[..., 0] - 1], contractions[after[..., 0]]
+    drop = np.where(high > low, high - low, 1.0)
+    root = start + (end - start) * np.clip(high / drop, 0.0, 1.0)
+    return np.where(index == 0, 0.0, np.where(index < 0, contractions[-1], root))
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Where the data end: pressures (Pa) and the largest contraction at each."""
+
+    pressures: Array
+    contraction: Array
+
+    def at(self, pressure: Array) -> Array:
+        """Largest recorded contraction, interpolated."""
+        return np.interp(pressure, self.pressures, self.contraction)
+
+    def outside(self, pressure: Array) -> NDArray[np.bool_]:
+        """Whether a pressure lies outside the recorded ones (by more than 1 %)."""
+        margin = 0.01 * self.pressures[-1]
+        return np.asarray((pressure < self.pressures[0] - margin) | (pressure > self.pressures[-1] + margin))
