@@ -168,14 +168,22 @@ def _frame(raw: bytes, form: TextFormat, *, text: bool) -> pd.DataFrame:
 
 
 def _check_count(label: str, lines: _Lines, frame: pd.DataFrame) -> None:
-    if len(frame) != len(lines.rows):  # a quotation mark that is never closed swallows rows
-        quotes = [line.count(b'"') % 2 for line in lines.raw.split(b"\n")]
-        row = int(lines.rows[quotes.index(1)]) if 1 in quotes else None
-        raise InputError(label, "an unbalanced quotation mark", "cells on one row each", row)
+    if len(frame) != len(lines.rows):
+        raise _open_quote(label, lines)
+
+
+def _open_quote(label: str, lines: _Lines) -> InputError:
+    """A quotation mark that is never closed swallows the rows after it."""
+    odd = [line.count(b'"') % 2 for line in lines.raw.split(b"\n")]
+    row = int(lines.rows[odd.index(1)]) if 1 in odd else None
+    return InputError(label, "an unbalanced quotation mark", "cells on one row each", row)
 
 
 def _first_bad_cell(label: str, lines: _Lines, form: TextFormat) -> tuple[int, str, str]:
-    frame = _frame(lines.raw, form, text=True)
+    try:
+        frame = _frame(lines.raw, form, text=True)
+    except pd.errors.ParserError:
+        raise _open_quote(label, lines) from None
     _check_count(label, lines, frame)
     mark = "[.]" if form.decimal == "." else ","
     number = rf"\s*[+-]?(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:[eE][+-]?\d+)?\s*|\s*[+-]?inf(?:inity)?\s*"

@@ -15,20 +15,24 @@ SAME_LEVEL_SHARE = 0.02
 LEAST_RUN = 5
 """Fewer rows than this far from their stroke's level are noise, not a change of level."""
 SMALLEST_GAP_PA = 0.3 * KPA
+STATIC_GAPS = (0.01, 0.02)
+"""Gaps between static levels, as shares of the largest reading: never below, surely above."""
+STROKE_GAPS = (0.025, 0.04)
+"""The same for strokes: a regulator lags, so the two branches of one level differ by a few percent."""
 
 
-def gap_clusters(values: Floats, spread: float = 0.0, widest_share: float = 0.04) -> Ints:
+def gap_clusters(values: Floats, shares: tuple[float, float], spread: float = 0.0) -> Ints:
     """Label readings of pressure (Pa, shape (n,)) by level, from 0 upwards.
 
-    Sorted readings part where the gap is wide: above 1 % of the largest reading and three times
-    ``spread`` (their own scatter), at the most ``widest_share`` of the largest; in between the
-    largest jump in the sorted gaps decides, because gaps within a level are alike and small.
+    Sorted readings part where the gap is wide: surely above the larger of ``shares`` of the largest
+    reading, never below the smaller one or three times ``spread`` (their own scatter); in between
+    the largest jump in the sorted gaps decides, because gaps within a level are alike and small.
     """
     order = np.argsort(values, kind="stable")
     gaps = np.diff(values[order])
     top = float(np.abs(values).max())
-    low = max(SMALLEST_GAP_PA, 0.01 * top, 3.0 * spread)
-    high = max(low, widest_share * top)
+    low = max(SMALLEST_GAP_PA, shares[0] * top, 3.0 * spread)
+    high = max(low, shares[1] * top)
     between = np.sort(np.concatenate([[low], gaps[(gaps > low) & (gaps < high)], [high]]))
     jump = int(np.argmax(np.diff(np.log(between))))
     limit = float(np.sqrt(between[jump] * between[jump + 1]))
@@ -43,7 +47,7 @@ def static_levels(pressure: Floats) -> Ints:
     A pressure swept without steps makes one endless cluster: such a one is cut into bins of 4 %
     of the largest reading, so that a level stays a level.
     """
-    labels = gap_clusters(pressure, widest_share=0.02)
+    labels = gap_clusters(pressure, STATIC_GAPS)
     widest = 0.05 * float(np.abs(pressure).max())
     cut = np.zeros(len(pressure))
     for label in np.unique(labels):
@@ -69,7 +73,7 @@ def stroke_levels(pressure: Floats, units: Ints, steady: np.ndarray[tuple[int], 
     counts = steady[starts] & (sizes >= 0.05 * np.median(sizes))
     if not counts.any():
         return static_levels(pressure)
-    label = gap_clusters(medians[counts], spread=1.4826 * float(np.median(scatter[counts])))
+    label = gap_clusters(medians[counts], STROKE_GAPS, 1.4826 * float(np.median(scatter[counts])))
     centres = np.array([np.median(medians[counts][label == i]) for i in range(label.max() + 1)])
     own = np.empty(len(starts), dtype=np.int64)
     own[counts] = label
@@ -83,7 +87,7 @@ def _nearest(values: Floats, centres: Floats) -> Ints:
 
 def _moved(pressure: Floats, own: Ints, centres: Floats) -> Ints:
     near = _nearest(pressure, centres)
-    runs = run_ids(near, own)
+    runs = run_ids(near)
     long = np.bincount(runs)[runs] >= LEAST_RUN
     return np.where(long, near, own)
 

@@ -65,9 +65,9 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
     levels_Pa, loops, force_map = _common_levels(loops, force_map, blocked, free)
     muscle_rows = sum(sum(counts) for kind, counts in rows.items() if kind != "tensile")
     if muscle_rows:
-        check_levels(source, simulation, len(levels_Pa))
         first = next(file for file in files if file.kind != "tensile")
         check_rows(first.label, muscle_rows, least_parameters(simulation, len(levels_Pa)))
+        check_levels(source, simulation, len(levels_Pa))
     return Specimen(
         name=declaration.specimen.name,
         bladder_material=declaration.specimen.bladder_material,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpam_calib.specimen.motion import noise_sd, run_starts
+from mpam_calib.specimen.motion import run_starts
 from mpam_calib.specimen.plausibility import longest_contraction
 from mpam_calib.specimen.recording import BRANCH_WORDS, Floats, Loops, Specimen
 from mpam_calib.units import KPA, MINUTE, MM
@@ -106,8 +106,16 @@ def sampling_rates(loops: Loops) -> tuple[float, ...]:
 
 
 def force_noise(loops: Loops) -> float:
-    """White noise of one force reading, N (second differences: slow changes cancel)."""
-    return noise_sd(loops.force_N) * math.sqrt(loops.averaged)
+    """White noise of one force reading, N.
+
+    From second differences within strokes, where slow changes cancel; nan without three rows.
+    """
+    inside = loops.stroke[2:] == loops.stroke[:-2]
+    second = np.abs(np.diff(loops.force_N, n=2))[inside]
+    if not len(second):
+        return math.nan
+    sd = 1.4826 * float(np.median(second)) / math.sqrt(6.0)  # 1, -2, 1: six variances
+    return sd * math.sqrt(loops.averaged)
 
 
 def oddities(specimen: Specimen) -> list[str]:

@@ -66,14 +66,12 @@ def _in_our_words(source: TomlSource, error: ErrorDetails) -> InputError:
     kind, value, context = error["type"], error["input"], error.get("ctx", {})
     table, name = keys[:-1], keys[-1] if keys else ""
     if kind == "extra_forbidden":
-        known = _known_keys(table)
+        known = list(_model_of(table).model_fields)
         where = f"[{'.'.join(table)}]" if table else "the file"
         what = f'the unknown key "{name}"' if not isinstance(value, dict) else f"the unknown table [{name}]"
         return fault(source, keys, what + did_you_mean(name, known), f"in {where} one of {listed(known)}")
     if kind == "missing":
-        what = f"[{name}]" if not table else f'the key "{name}" in [{".".join(table)}]'
-        found = f"no {what[4:]}" if what.startswith("the ") else f"no table {what}"
-        return InputError(source.file, found, what, source.line_of(table) if table else None, ".".join(keys))
+        return _missing(source, keys)
     found = shown(value)
     if kind == "literal_error":
         words = re.findall(r"'([^']*)'", str(context["expected"]))
@@ -89,6 +87,15 @@ def _in_our_words(source: TomlSource, error: ErrorDetails) -> InputError:
     if isinstance(value, str) and "number" in expected:
         found, expected = f"the text {found}", f"{expected} (without quotes)"
     return fault(source, keys, found, expected)
+
+
+def _missing(source: TomlSource, keys: Sequence[str]) -> InputError:
+    table, name = keys[:-1], keys[-1]
+    needed = [key for key, field in _model_of(table).model_fields.items() if field.is_required()]
+    if not table:
+        return InputError(source.file, f"no table [{name}]", f"[{name}] with its keys", column=name)
+    found = f'no key "{name}" in [{".".join(table)}]'
+    return InputError(source.file, found, listed(needed), source.line_of(table), ".".join(keys))
 
 
 def _range_words(keys: Sequence[str], kind: str, context: dict[str, Any]) -> str:
@@ -117,7 +124,8 @@ def _keys_in_file(tables: dict[str, Any], loc: Sequence[str | int], kind: str) -
     return keys
 
 
-def _known_keys(table: Sequence[str]) -> list[str]:
+def _model_of(table: Sequence[str]) -> type[BaseModel]:
+    """The model that describes a table."""
     model: type[BaseModel] = Declaration
     for key in table:
         annotation = model.model_fields[key].annotation if key in model.model_fields else None
@@ -127,7 +135,7 @@ def _known_keys(table: Sequence[str]) -> list[str]:
         models += [part for part in nested if isinstance(part, type) and issubclass(part, BaseModel)]
         if models:
             model = models[0]
-    return list(model.model_fields)
+    return model
 
 
 def _check_effects(source: TomlSource, declaration: Declaration) -> None:

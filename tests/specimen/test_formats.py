@@ -1,0 +1,116 @@
+"""The same loops, however a rig writes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mpam_calib.specimen import read
+from mpam_calib.specimen.blocks import read_blocks
+from mpam_calib.specimen.declaration import Csv
+from mpam_calib.specimen.tables import TABLES
+from mpam_calib.specimen.text_format import detect_format
+
+from .folders import DECLARATION, HEADER, loops, make
+
+PLAIN = loops().text()
+
+
+def quoted(text: str) -> str:
+    return "\n".join(",".join(f'"{cell}"' for cell in row.split(",")) for row in text.splitlines())
+
+
+def extra(text: str) -> str:
+    lines = text.splitlines()
+    return "\n".join([f'note,{lines[0]},"a, b"', *(f'01.02.2024 10:00,{row},"x, y"' for row in lines[1:])])
+
+
+FORMATS: dict[str, bytes] = {
+    "BOM": b"\xef\xbb\xbf" + PLAIN.encode(),
+    "CRLF": PLAIN.replace("\n", "\r\n").encode(),
+    "CR only": PLAIN.replace("\n", "\r").encode(),
+    "no newline at the end": PLAIN.rstrip("\n").encode(),
+    "blank rows": PLAIN.replace("\n", "\n\n", 3).encode() + b"\n  \n",
+    "semicolons": PLAIN.replace(",", ";").encode(),
+    "semicolons with decimal commas": PLAIN.replace(",", ";").replace(".", ",").encode(),
+    "tabs": PLAIN.replace(",", "\t").encode(),
+    "tabs with decimal commas": PLAIN.replace(",", "\t").replace(".", ",").encode(),
+    "spaces": PLAIN.replace(",", " , ").encode(),
+    "quoted": quoted(PLAIN).encode(),
+    "quoted with decimal commas": quoted(PLAIN).replace(".", ",").encode(),
+    "extra columns": extra(PLAIN).encode(),
+    "a degree sign of Windows": PLAIN.replace("\n", ";\n")
+    .replace(",", ";")
+    .encode()
+    .replace(b"N;", b"N;\xb0C"),
+    "rows before the header": b"Rig 7, operator X\nDate;2024-01-01\n\n" + PLAIN.encode(),
+}
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_gives_the_same_rows(name: str, tmp_path: Path) -> None:
+    folder = make(tmp_path)
+    (folder / "loops.csv").write_bytes(FORMATS[name])
+    found = read(folder).loops
+    assert found is not None
+    columns = np.column_stack(
+        [found.time_s, found.pressure_Pa / 1e3, found.displacement_m * 1e3, found.force_N]
+    )
+    assert columns == pytest.approx(loops().columns(), abs=1e-5)
+
+
+def test_decimal_commas_that_appear_late(tmp_path: Path) -> None:
+    rows = [f"{i};50;{i % 20};3" for i in range(30_000)] + ["30000,5;50;1;3"]
+    (tmp_path / "loops.csv").write_text("\n".join([HEADER.replace(",", ";"), *rows]))
+    spec = TABLES["loops"]
+    form = detect_format(tmp_path / "loops.csv", "loops.csv", spec, Csv(), {})
+    frames = list(read_blocks(tmp_path / "loops.csv", "loops.csv", spec, form))
+    assert frames[-1]["time_s"].iloc[-1] == 30000.5
+    assert frames[-1].index[-1] == 30002
+
+
+def test_declared_format(tmp_path: Path) -> None:
+    text = "made by;rig 3\nunits, below\n" + PLAIN.replace(",", "|")
+    declaration = DECLARATION + '[csv]\ndelimiter = "|"\ndecimal = "."\nskip_rows = 2\n'
+    assert read(make(tmp_path, declaration, loops=text)).files[0].delimiter == "|"
+
+
+def test_a_rigs_own_columns(tmp_path: Path) -> None:
+    recording = loops()
+    lines = recording.text("Time,p/bar,Travel,Load").splitlines()
+    table = [[float(cell) for cell in line.split(",")] for line in lines[1:]]
+    rows = [f"{t * 1000!r},{p / 100!r},{30 - x!r},{-f!r}" for t, p, x, f in table]
+    declaration = DECLARATION + (
+        "[columns.loops]\n"
+        'time_s = { name = "Time", scale = 0.001 }\n'
+        'pressure_kPa = { name = "p/bar", scale = 100.0 }\n'
+        'displacement_mm = { name = "Travel", scale = -1.0, offset = 30.0 }\n'
+        'force_N = { name = "Load", scale = -1.0 }\n'
+    )
+    found = read(make(tmp_path, declaration, loops="\n".join([lines[0], *rows]))).loops
+    assert found is not None
+    assert found.pressure_Pa == pytest.approx(recording.pressure * 1e3)
+    assert found.displacement_m == pytest.approx(recording.displacement * 1e-3, abs=1e-8)
+    assert found.force_N == pytest.approx(recording.force, abs=1e-5)
+    assert found.time_s == pytest.approx(recording.time)
+
+
+NUMBERS = st.floats(-1e12, 1e12, allow_nan=False).filter(lambda value: value == 0 or abs(value) > 1e-12)
+
+
+@given(st.lists(NUMBERS, min_size=1, max_size=20), st.sampled_from([".", ","]))
+@settings(max_examples=60, deadline=None)
+def test_numbers_survive_both_decimal_marks(
+    tmp_path_factory: pytest.TempPathFactory, values: list[float], mark: str
+) -> None:
+    file = tmp_path_factory.mktemp("numbers") / "blocked_force.csv"
+    rows = [f"{value!r};1".replace(".", mark) for value in values]
+    file.write_text("\n".join(["force_N;pressure_kPa", *rows]))
+    spec = TABLES["blocked_force"]
+    form = detect_format(file, "f", spec, Csv(), {})
+    found = [value for block in read_blocks(file, "f", spec, form) for value in block["force_N"]]
+    assert found == pytest.approx(values, rel=1e-14)

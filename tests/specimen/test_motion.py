@@ -1,0 +1,114 @@
+"""Branches, cycles and strokes read off noisy synthetic motion whose truth is known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mpam_calib.specimen.motion import (
+    detect_branch,
+    noise_sd,
+    number_cycles,
+    run_ids,
+    turn_threshold,
+    turning_points,
+)
+
+from .folders import loops
+
+MOTIONS: dict[str, dict[str, Any]] = {
+    "clean": {},
+    "encoder noise": {"encoder_sd": 0.01, "rate": 100.0},
+    "much encoder noise": {"encoder_sd": 0.05, "rate": 100.0},
+    "coarse encoder": {"quantum": 0.05, "encoder_sd": 0.01, "rate": 100.0},
+    "holds": {"dwell": 200, "encoder_sd": 0.01, "rate": 100.0},
+    "long holds": {"dwell": 5000, "encoder_sd": 0.02, "rate": 100.0},
+    "two speeds": {"speeds": (0.8, 4.0), "encoder_sd": 0.01, "rate": 50.0},
+    "few rows": {"rate": 2.0},
+}
+
+
+def zigzag(values: list[float], threshold: float) -> int:
+    """Number of strokes that a hysteresis comparator counts, row by row."""
+    low = high = values[0]
+    direction = strokes = 0
+    for value in values:
+        if direction >= 0 and value > high:
+            high = value
+        if direction <= 0 and value < low:
+            low = value
+        if direction != 1 and value - low >= threshold:
+            direction, high = 1, value
+            strokes += 1
+        elif direction != -1 and high - value >= threshold:
+            direction, low = -1, value
+            strokes += 1
+    return strokes
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize("seed", range(3))
+def test_branch_of_nearly_every_row(name: str, seed: int) -> None:
+    recording = loops(levels=(100.0,), cycles=3, seed=seed, **MOTIONS[name])
+    x = recording.displacement
+    found = detect_branch(x, turn_threshold(x), noise_sd(x))
+    assert set(np.unique(found)) == {-1, 1}
+    strokes = run_ids(found)[-1] + 1
+    assert strokes == run_ids(recording.branch)[-1] + 1
+    # Where a turn stands is uncertain by the rows that the noise covers.
+    per_turn = np.count_nonzero(found != recording.branch) / strokes
+    rows_in_noise = 6.0 * MOTIONS[name].get("encoder_sd", 0.0) * MOTIONS[name].get("rate", 10.0) / 0.8
+    assert per_turn <= 2 + rows_in_noise
+
+
+def test_rows_before_the_first_motion_have_no_branch() -> None:
+    x = np.concatenate([np.zeros(300), np.linspace(0.0, 10.0, 500)])
+    found = detect_branch(x, turn_threshold(x), noise_sd(x))
+    assert (found[:299] == 0).all() and (found[302:] == -1).all()
+
+
+def test_a_hold_in_mid_stroke_belongs_to_the_stroke() -> None:
+    x = np.concatenate([np.linspace(0, 5, 300), np.full(200, 5.0), np.linspace(5, 10, 300)])
+    x = x + 0.01 * np.random.default_rng(0).normal(size=len(x))
+    assert (detect_branch(x, turn_threshold(x), noise_sd(x)) == -1).all()
+
+
+def test_noise_is_estimated_through_motion() -> None:
+    x = loops(levels=(100.0,), cycles=3, encoder_sd=0.02, rate=100.0).displacement
+    assert noise_sd(x) == pytest.approx(0.02, rel=0.1)
+
+
+@given(
+    st.lists(st.integers(-6, 6), min_size=2, max_size=60),
+    st.integers(1, 5),
+)
+@settings(max_examples=300, deadline=None)
+def test_turning_points_are_those_of_a_hysteresis_comparator(steps: list[int], threshold: int) -> None:
+    values = np.cumsum(steps).astype(float)
+    turns = turning_points(values, threshold)
+    swings = np.diff(values[turns])
+    assert (np.abs(swings) >= threshold).all()
+    assert (np.sign(swings[1:]) == -np.sign(swings[:-1])).all()
+    assert len(swings) == zigzag(list(values), threshold)
+
+
+def test_turning_points_of_a_million_rows_of_chatter_take_few_passes() -> None:
+    x = np.round(np.random.default_rng(0).normal(size=200_000))
+    assert len(turning_points(x, 100.0)) == 1
+
+
+def test_cycles_count_within_a_level() -> None:
+    level = np.array([0, 0, 0, 0, 1, 1, 0, 0, 0])
+    branch = np.array([-1, 1, -1, 1, 1, -1, 0, -1, 1])
+    assert number_cycles(level, np.zeros(9, dtype=int), branch).tolist() == [1, 1, 2, 2, 1, 1, 3, 3, 3]
+
+
+def test_one_stroke_in_each_file_still_makes_a_cycle() -> None:
+    zeros = np.zeros(4, dtype=int)
+    clock = np.array([0, 1, 2, 3])
+    assert number_cycles(zeros, clock, np.array([-1, 1, -1, 1])).tolist() == [1, 1, 2, 2]
+    assert number_cycles(zeros, clock, np.array([-1, -1, 1, 1])).tolist() == [1, 2, 2, 3]

@@ -1,0 +1,102 @@
+"""Files of any size: memory that does not grow with them, and averages that respect the turns."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpam_calib.specimen import read, reduction
+
+from .folders import DECLARATION, HEADER, Recording, loops, make
+
+LIMIT_MIB = 300.0
+
+
+def write_large(folder: Path, megabytes: float) -> int:
+    """Write loops of about this size, the same strokes again and again; returns the number of rows."""
+    make(folder, DECLARATION)
+    part = loops((50.0, 100.0, 150.0), cycles=2, rate=100.0, encoder_sd=0.01, pressure_sd=0.2)
+    body = part.columns()
+    count = 0
+    with (folder / "loops.csv").open("w") as stream:
+        stream.write(HEADER + "\n")
+        while stream.tell() < megabytes * 1e6:
+            body[:, 0] = part.time + count / 100.0
+            np.savetxt(stream, body, fmt="%.3f", delimiter=",")
+            count += len(body)
+    return count
+
+
+def check_in_a_process(folder: Path) -> tuple[str, float]:
+    """Output of ``check`` and the peak memory of its process in MiB."""
+    code = (
+        "import resource, sys\n"
+        "from mpam_calib.cli import main\n"
+        f"sys.argv = ['mpam-calib', 'check', {str(folder)!r}]\n"
+        "try:\n    main()\nfinally:\n"
+        "    print('peak', resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)\n"
+        "    heavy = {'matplotlib', 'arviz', 'emcee', 'scipy'} & set(sys.modules)\n"
+        "    print('heavy', sorted(heavy), file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    lines = done.stderr.splitlines()
+    assert lines[1:] == ["heavy []"]
+    return done.stdout, int(lines[0].split()[1]) / 1024
+
+
+@pytest.mark.skipif(not hasattr(resource, "getrusage"), reason="needs getrusage")
+@pytest.mark.parametrize("megabytes", [10, pytest.param(200, marks=pytest.mark.long)])
+def test_memory_of_check(megabytes: int, tmp_path: Path) -> None:
+    count = write_large(tmp_path, megabytes)
+    output, peak = check_in_a_process(tmp_path)
+    assert f"{count}" in output
+    assert peak <= LIMIT_MIB
+
+
+@pytest.fixture
+def few_rows_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reduction, "ROWS_KEPT", 3000)
+
+
+def noisy() -> Recording:
+    return loops((50.0, 150.0), cycles=3, rate=100.0, encoder_sd=0.01, pressure_sd=0.3, dwell=50)
+
+
+@pytest.mark.usefixtures("few_rows_kept")
+def test_averages_keep_strokes_levels_and_means(tmp_path: Path) -> None:
+    recording = noisy()
+    specimen = read(make(tmp_path, loops=recording.text()))
+    found = specimen.loops
+    assert found is not None and found.averaged > 2
+    assert any("averaged" in note for note in specimen.notes)
+    assert len(found.time_s) <= 1.2 * len(recording.time) / found.averaged
+    assert specimen.levels_Pa / 1e3 == pytest.approx([50.0, 150.0], abs=0.2)
+    assert found.stroke[-1] + 1 == 12
+    assert set(found.cycle) == {1, 2, 3}
+    # No average mixes two levels or two branches: the force law of each holds for the means.
+    sign = np.where(found.branch == 1, 1.0, -1.0)
+    law = 0.3 * found.pressure_Pa / 1e3 * (1.0 - found.displacement_m * 1e3 / 20.0) * (1.0 + 0.05 * sign)
+    assert np.quantile(np.abs(found.force_N - law) / law, 0.99) < 0.02
+    assert np.abs(found.pressure_Pa[found.level == 0] - 50e3).max() < 1e3
+
+
+@pytest.mark.usefixtures("few_rows_kept")
+def test_averages_do_not_depend_on_where_the_blocks_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mpam_calib.specimen.blocks.BLOCK_BYTES", 40_000)
+    specimen = read(make(tmp_path, loops=noisy().text()))
+    assert specimen.loops is not None and specimen.loops.stroke[-1] + 1 == 12
+
+
+def test_small_blocks_report_the_right_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mpam_calib.specimen.blocks.BLOCK_BYTES", 1000)
+    lines = noisy().text().splitlines()
+    lines[2345] = "1,2,x,4"
+    with pytest.raises(Exception, match=r"loops.csv:2346:displacement_mm: "):
+        read(make(tmp_path, loops="\n".join(lines)))
