@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mpam_calib.model.model import MaterialPosterior, Model, Options
+from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
+from mpam_calib.model.model import Model
 from mpam_calib.posterior.checkpoint import Checkpoint
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.convergence import ESS_WANTED
@@ -57,21 +58,22 @@ class Calibration:
 
     def bands(self, pressures_kPa: Array | list[float] | None = None) -> pd.DataFrame:
         """Credible bands at pressures (kPa; the specimen's levels by default), as in ``bands.csv``."""
-        return predict(self.model, self.draws, self.specimen, self.seed, pressures_kPa)
+        return predict(self.model, self.draws, self.seed, pressures_kPa)
 
 
 def predict(
     model: Model,
     draws: Draws,
-    specimen: Specimen,
     seed: int,
     pressures_kPa: Array | list[float] | None = None,
 ) -> pd.DataFrame:
     """Bands of everything the model predicts: the muscle's at the pressures, the material's stress."""
     parts = []
     if model.chain is not None:
-        pressures = specimen.levels_Pa if pressures_kPa is None else np.asarray(pressures_kPa) * KPA
-        parts.append(muscle_bands(model, draws, specimen, pressures, seed))
+        pressures = (
+            np.array(model.blueprint.levels) if pressures_kPa is None else np.asarray(pressures_kPa) * KPA
+        )
+        parts.append(muscle_bands(model, draws, pressures, seed))
     if model.tensile is not None:
         parts.append(stress_bands(model, draws, seed))
     return pd.concat(parts, ignore_index=True)
@@ -93,7 +95,7 @@ def calibrate(
     Raises ``InputError`` where the specimen cannot carry the model. See ``Calibration.converged`` for
     whether the draws can be used.
     """
-    target = build_target(specimen, options, material)
+    target = build_target(specimen, draw_blueprint(specimen, options, material))
     found = checkpoint.load("modes") if checkpoint else None
     if found is None:
         found = locate(target, np.random.default_rng([seed, 0]))

@@ -14,14 +14,24 @@ def main() -> None:
     # One BLAS thread: the parallelism is over ensembles, and sums must not depend on the machine.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
+    import typer
+
     from mpam_calib.cli.app import app
     from mpam_calib.errors import InputError, Interrupted
 
     try:
-        app()
+        code = app(standalone_mode=False)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
-        sys.exit(BAD_INPUT)
-    except (Interrupted, KeyboardInterrupt):
+        code = BAD_INPUT
+    except (Interrupted, KeyboardInterrupt, typer.Abort):
         print("interrupted: the same command resumes", file=sys.stderr)
-        sys.exit(INTERRUPTED)
+        code = INTERRUPTED
+    except Exception as error:
+        # A wrong option: the command line's parser knows how to say so in one line.
+        message = getattr(error, "format_message", None)
+        if message is None:
+            raise
+        print(f"error: {message()}", file=sys.stderr)
+        code = BAD_INPUT
+    sys.exit(code)

@@ -15,3 +15,5 @@ app = typer.Typer(
 # The commands, in the order in which the help lists them; each module registers its own on ``app``.
 from mpam_calib.cli import init  # noqa: E402, F401  isort: skip
 from mpam_calib.cli import check  # noqa: E402, F401  isort: skip
+from mpam_calib.cli import calibrate  # noqa: E402, F401  isort: skip
+from mpam_calib.cli import predict  # noqa: E402, F401  isort: skip

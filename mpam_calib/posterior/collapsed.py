@@ -242,7 +242,15 @@ def _solve(matrix: Array, right: Array) -> Array:
 
 
 def _cholesky(matrix: Array) -> Array:
-    return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+    """Cholesky factors; nan for a matrix that rounding has made indefinite (its density counts as 0)."""
+    try:
+        return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        good = np.all(np.isfinite(matrix), axis=(-2, -1))
+        good[good] = np.linalg.eigvalsh(matrix[good])[..., 0] > 0.0
+        factor = np.full_like(matrix, np.nan)
+        factor[good] = np.linalg.cholesky(matrix[good])
+        return factor
 
 
 def _white_piece(design: Array, residual: Array, variance: Array) -> Piece:
@@ -256,7 +264,7 @@ def _white_piece(design: Array, residual: Array, variance: Array) -> Piece:
 def _segment_piece(covariance: Array, padded: Array, rows: int) -> Piece:
     """The share of correlated segments: covariance (B, S, m, m), [A r] padded (B, S, m, k + 1)."""
     B, S, m, width = padded.shape
-    factor = np.linalg.cholesky(covariance)
+    factor = _cholesky(covariance)
     log_det = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=2, axis2=3)), axis=(1, 2))
     weighted = (np.linalg.inv(covariance) @ padded).reshape(B, S * m, width)
     full = np.swapaxes(padded.reshape(B, S * m, width), 1, 2) @ weighted
@@ -287,18 +295,18 @@ def _with_slack(gram: Array, pull: Array, constant: Array, parts: list[Slack]) -
     def state(eta: Array) -> tuple[Array, Array, Array]:
         z = (floor - fixed - np.einsum("bnk,bk->bn", columns, eta)) / sd
         log_cdf = special.log_ndtr(z)
-        ratio = np.exp(-0.5 * z**2 - 0.5 * LOG_2PI - log_cdf)
-        return log_cdf.sum(axis=1), ratio, z
+        # φ/Φ by the scaled error function: both underflow far from the floor.
+        ratio = np.sqrt(2.0 / np.pi) / special.erfcx(-z / np.sqrt(2.0))
+        weight = np.clip(ratio * (z + ratio), 0.0, 1.0) / sd**2
+        return log_cdf.sum(axis=1), ratio, weight
 
     for _ in range(NEWTON_STEPS):
-        _, ratio, z = state(eta)
+        _, ratio, weight = state(eta)
         gradient = pull - np.einsum("bkl,bl->bk", gram, eta)
         gradient -= np.einsum("bnk,bn->bk", columns, ratio / sd)
-        weight = ratio * (z + ratio) / sd**2
         hessian = gram + np.swapaxes(columns, 1, 2) @ (columns * weight[..., None])
         eta = eta + _solve(hessian, gradient)
-    log_cdf, ratio, z = state(eta)
-    weight = ratio * (z + ratio) / sd**2
+    log_cdf, _, weight = state(eta)
     hessian = gram + np.swapaxes(columns, 1, 2) @ (columns * weight[..., None])
     factor = _cholesky(hessian)
     log_det = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.model.model import MaterialPosterior, Model, Options, build_model
+from mpam_calib.model.blueprint import Blueprint
+from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import SMOOTH
 from mpam_calib.posterior.bins import bin_loops
@@ -25,11 +26,12 @@ SLOPE_STEP = 1e-3
 """Contraction step of the slope at a free contraction."""
 
 
-def build_target(
-    specimen: Specimen, options: Options | None = None, material: MaterialPosterior | None = None
-) -> Collapsed:
-    """The collapsed posterior of a specimen, before anything is known of the force."""
-    model = build_model(specimen, options, material)
+def build_target(specimen: Specimen, blueprint: Blueprint) -> Collapsed:
+    """The collapsed posterior of a specimen's recordings under a blueprint's model.
+
+    The recordings may be part of those that the blueprint was drawn from (a fold).
+    """
+    model = build_model(blueprint)
     tensile = None
     if specimen.tensile is not None and model.tensile is not None:
         tensile = gather_tensile(specimen.tensile, model.tensile.low, model.tensile.high)

@@ -10,7 +10,6 @@ from mpam_calib.model.model import Model
 from mpam_calib.model.tensile import MISFIT, NOISE
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.prediction.curves import BRANCHES, Curves, Reach, contraction_grid, first_root, force_curves
-from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import KPA
 
 Array = NDArray[np.float64]
@@ -33,30 +32,12 @@ QUANTILES = [0.05, 0.25, 0.5, 0.75, 0.95]
 STRESS_POINTS = 101
 
 
-def data_reach(specimen: Specimen) -> Reach:
-    """Where the muscle's data end, level by level."""
-    levels = specimen.levels_Pa
-    reach = np.zeros(len(levels))
-    assert specimen.geometry is not None
-    if (loops := specimen.loops) is not None:
-        np.maximum.at(reach, loops.level, loops.displacement_m / specimen.geometry.L0)
-    if (grid := specimen.force_map) is not None:
-        seen = ~grid.censored
-        np.maximum.at(reach, grid.level[seen], grid.contraction[seen])
-    if (free := specimen.free_contraction) is not None:
-        nearest = np.abs(free.pressure_Pa[:, None] - levels).argmin(axis=1)
-        np.maximum.at(reach, nearest, free.contraction)
-    return Reach(levels, reach)
-
-
-def muscle_bands(
-    model: Model, draws: Draws, specimen: Specimen, pressures: Array, seed: int, trim: bool = True
-) -> pd.DataFrame:
+def muscle_bands(model: Model, draws: Draws, pressures: Array, seed: int, trim: bool = True) -> pd.DataFrame:
     """Bands on force, blocked force and free contraction at pressures (Pa), each also ``_observed``.
 
     Curves end at the first grid point at or beyond the mean free contraction (``trim``).
     """
-    reach = data_reach(specimen)
+    reach = Reach(np.array(model.blueprint.levels), np.array(model.blueprint.reach))
     grid = contraction_grid(model, float(reach.contraction.max()))
     curves = force_curves(model, draws.thin(DRAWS), pressures, grid, seed)
     rng = np.random.default_rng([seed, 5])

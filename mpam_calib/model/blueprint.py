@@ -1,0 +1,159 @@
+"""All that a model is built from, and nothing of the data it will be fitted to but their design.
+
+A blueprint is drawn once from a whole specimen. Folds, resumed runs and predictions build their models
+from it, so that all of them share one prior.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from mpam_calib.model.reference import force_scale, geometric_contraction
+from mpam_calib.model.state import Setting
+from mpam_calib.specimen.declaration import Braid, Geometry, Sensors, Simulation
+from mpam_calib.specimen.recording import Loops, Specimen
+
+Array = NDArray[np.float64]
+
+PULL_SHARE = 0.02
+"""A muscle that shows this share of its greatest force pulls."""
+
+
+class Value(BaseModel):
+    """A frozen value that goes to JSON and back unchanged."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Options(Value):
+    """What may be left out of a model (for comparison, or to meet an exact reference)."""
+
+    correlated_noise: bool = True
+    remainder: bool = True
+    nuisances: bool = True
+
+
+class MaterialPosterior(Value):
+    """Moduli as another run left them: mean (order,), covariance (order, order), Pa."""
+
+    mean: tuple[float, ...]
+    covariance: tuple[tuple[float, ...], ...]
+    strain_range: tuple[float, float]
+    convention: str
+
+
+class Blueprint(Value):
+    """Declaration and design of one specimen, SI units.
+
+    ``stroke`` (m) is the largest recorded displacement, ``reach`` the largest contraction at each
+    level, ``pulls_at`` (Pa) the lowest pressure with a clear pull, ``stroke_time`` (s) the median
+    duration of a stroke (None without loops).
+    """
+
+    simulation: Simulation
+    geometry: Geometry | None
+    braid: Braid | None
+    sensors: Sensors
+    levels: tuple[float, ...]
+    stroke: float
+    reach: tuple[float, ...]
+    pulls_at: float
+    stroke_time: float | None
+    branches: bool
+    free_contraction: bool
+    tensile_range: tuple[float, float] | None
+    material: MaterialPosterior | None = None
+    options: Options = Options()
+
+    def setting(self) -> Setting | None:
+        """The muscle's setting; None where only a material was tested."""
+        if self.geometry is None or not self.levels:
+            return None
+        levels = np.array(self.levels)
+        return Setting(
+            simulation=self.simulation,
+            geometry=self.geometry,
+            braid=self.braid,
+            levels=levels,
+            stroke=self.stroke,
+            force_scale=force_scale(self.geometry, levels),
+            force_sd=self.sensors.force_sd_N,
+            pressure_bias_sd=self.sensors.pressure_bias_sd,
+            pulls_at=self.pulls_at,
+        )
+
+
+def draw_blueprint(
+    specimen: Specimen, options: Options | None = None, material: MaterialPosterior | None = None
+) -> Blueprint:
+    """The blueprint of a specimen; ``material`` is what ``moduli = "run:..."`` names, already read."""
+    loops = specimen.loops
+    reach = _reach(specimen)
+    stroke = float(reach.max(initial=0.0)) * (specimen.geometry.L0 if specimen.geometry else 0.0)
+    if specimen.geometry is not None and stroke <= 0.0:
+        stroke = geometric_contraction(specimen.geometry) * specimen.geometry.L0
+    parts = (loops, specimen.force_map)
+    return Blueprint(
+        simulation=specimen.simulation,
+        geometry=specimen.geometry,
+        braid=specimen.braid,
+        sensors=specimen.sensors,
+        levels=tuple(float(level) for level in specimen.levels_Pa),
+        stroke=stroke,
+        reach=tuple(float(r) for r in reach),
+        pulls_at=_pulls_at(specimen),
+        stroke_time=None if loops is None else _stroke_time(loops),
+        branches=any(p is not None and bool(np.any(np.abs(p.branch) == 1)) for p in parts),
+        free_contraction=specimen.free_contraction is not None,
+        tensile_range=_tensile_range(specimen),
+        material=material,
+        options=options or Options(),
+    )
+
+
+def _reach(specimen: Specimen) -> Array:
+    """Largest recorded contraction at each level (levels,)."""
+    levels = specimen.levels_Pa
+    reach = np.zeros(len(levels))
+    if specimen.geometry is None:
+        return reach
+    if (loops := specimen.loops) is not None:
+        np.maximum.at(reach, loops.level, loops.displacement_m / specimen.geometry.L0)
+    if (grid := specimen.force_map) is not None:
+        seen = ~grid.censored
+        np.maximum.at(reach, grid.level[seen], grid.contraction[seen])
+    if (free := specimen.free_contraction) is not None and len(levels):
+        nearest = np.abs(free.pressure_Pa[:, None] - levels).argmin(axis=1)
+        np.maximum.at(reach, nearest, free.contraction)
+    return reach
+
+
+def _pulls_at(specimen: Specimen) -> float:
+    """The lowest pressure (Pa) with a clear pull; the top level where nothing pulls."""
+    top = float(specimen.levels_Pa[-1]) if len(specimen.levels_Pa) else 0.0
+    parts = [p for p in (specimen.loops, specimen.force_map, specimen.blocked_force) if p is not None]
+    if not parts:
+        return top
+    force = np.concatenate([part.force_N for part in parts])
+    pressure = np.concatenate([part.pressure_Pa for part in parts])
+    clear = force > max(PULL_SHARE * float(force.max()), 5.0 * (specimen.sensors.force_sd_N or 0.0))
+    # One stray reading must not decide: the first percentile of the pulling pressures.
+    return float(np.quantile(pressure[clear], 0.01)) if clear.any() else top
+
+
+def _tensile_range(specimen: Specimen) -> tuple[float, float] | None:
+    """The declared range of strain, else all positive strains of the test."""
+    if specimen.tensile is None:
+        return None
+    if specimen.fit.tensile_strain is not None:
+        return specimen.fit.tensile_strain
+    strain = specimen.tensile.strain
+    return max(float(strain.min()), 0.0), float(strain.max())
+
+
+def _stroke_time(loops: Loops) -> float:
+    starts = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
+    ends = np.append(starts[1:], len(loops.stroke)) - 1
+    return float(np.median(np.maximum(loops.time_s[ends] - loops.time_s[starts], 1e-3)))

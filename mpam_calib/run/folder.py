@@ -1,0 +1,174 @@
+"""One calibration's folder: posterior.nc, summary.csv, bands.csv, run.json, report.html."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mpam_calib.calibration import Calibration
+from mpam_calib.errors import InputError
+from mpam_calib.model.blueprint import Blueprint, MaterialPosterior
+from mpam_calib.model.model import Model, build_model
+from mpam_calib.posterior.checkpoint import Checkpoint, write_atomically
+from mpam_calib.posterior.draws import Draws, reported
+from mpam_calib.run.files import write_csv, write_json
+
+PACKAGES = ("mpam-calib", "arviz", "emcee", "numpy", "scipy", "pandas")
+
+
+def versions() -> dict[str, str]:
+    """Versions of what a result depends on."""
+    return {name: importlib.metadata.version(name) for name in PACKAGES}
+
+
+def run_digest(specimen_digest: str, **options: Any) -> str:
+    """SHA-256 over data, model, options and versions: what decides whether a RUN can be kept."""
+    content = json.dumps([specimen_digest, options, versions()], sort_keys=True, default=str)
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """A RUN folder and the digest of what it should hold."""
+
+    path: Path
+    digest: str
+
+    @property
+    def checkpoint(self) -> Checkpoint:
+        """Where an unfinished run keeps its blocks."""
+        return Checkpoint(self.path / "checkpoint", self.digest)
+
+    def state(self) -> dict[str, Any] | None:
+        """``run.json`` where it belongs to this digest, else None."""
+        try:
+            content: dict[str, Any] = json.loads((self.path / "run.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return content if content.get("digest") == self.digest else None
+
+    def write(self, calibration: Calibration) -> None:
+        """Write everything but the report; ``run.json`` comes last, as the mark of a finished run."""
+        (self.path / "run.json").unlink(missing_ok=True)
+        write_csv(calibration.summary, self.path / "summary.csv")
+        write_csv(calibration.bands(), self.path / "bands.csv")
+        write_posterior(calibration, self.path / "posterior.nc")
+        write_json(describe(calibration, self.digest), self.path / "run.json")
+
+
+def describe(calibration: Calibration, digest: str) -> dict[str, Any]:
+    """The content of ``run.json``: no times, no paths."""
+    sampling, specimen = calibration.sampling, calibration.specimen
+    ensembles, steps, walkers, dimensions = sampling.chain.shape
+    summary = calibration.summary
+    return {
+        "format": 1,
+        "digest": digest,
+        "specimen_digest": specimen.digest,
+        "converged": calibration.converged,
+        "seed": calibration.seed,
+        "versions": versions(),
+        "specimen": {"name": specimen.name, "bladder_material": specimen.bladder_material},
+        "blueprint": calibration.model.blueprint.model_dump(mode="json"),
+        "sampling": {
+            "ensembles": ensembles,
+            "walkers": walkers,
+            "steps": steps,
+            "parameters": list(calibration.model.names),
+            "dimensions": dimensions,
+            "acceptance": round(sampling.acceptance, 6),
+            "warm_up_acceptance": [round(a, 6) for a in sampling.warm_up_acceptance],
+            "ess_wanted": calibration.ess_wanted,
+            "rhat_max": round(float(summary["rhat"].max()), 6),
+            "ess_bulk_min": round(float(summary["ess_bulk"].min()), 3),
+            "ess_tail_min": round(float(summary["ess_tail"].min()), 3),
+            "modes": [
+                {"log_posterior": round(m.log_posterior, 6), "log_evidence": round(m.log_evidence, 6)}
+                for m in sampling.modes
+            ],
+        },
+    }
+
+
+def write_posterior(calibration: Calibration, path: Path) -> None:
+    """ArviZ InferenceData, chain = ensemble: reported quantities in lab units, and what predictions need."""
+    import arviz as az
+
+    draws, chains = calibration.draws, calibration.draws.chains
+    posterior = {item.name: item.draws.reshape(chains, -1) for item in calibration.reported}
+    shape = (chains, len(draws) // chains)
+    sampler = {
+        "coordinates": draws.u.reshape(*shape, -1),
+        "linear_coordinates": draws.eta.reshape(*shape, -1),
+    }
+    log_prob = calibration.sampling.log_prob
+    data = az.from_dict(
+        posterior=posterior,
+        sample_stats={"lp": log_prob.reshape(chains, -1)},
+        attrs={"inference_library": "emcee", "digest": calibration.specimen.digest},
+    )
+    data.add_groups({"sampler_coordinates": sampler}, warn_on_custom_groups=False)
+    for group in data.groups():
+        # A time of writing would make two equal runs differ.
+        data[group].attrs.pop("created_at", None)
+        for name in ("digest",):
+            data[group].attrs.setdefault(name, calibration.specimen.digest)
+    write_atomically(path, lambda p: data.to_netcdf(str(p), engine="h5netcdf"))
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """A finished RUN, ready to predict."""
+
+    path: Path
+    model: Model
+    draws: Draws
+    state: dict[str, Any]
+
+    @property
+    def seed(self) -> int:
+        """The seed that the run was made with."""
+        return int(self.state["seed"])
+
+
+def load_run(path: Path) -> StoredRun:
+    """Read a RUN folder; raises ``InputError`` where it is none or is not finished."""
+    import arviz as az
+
+    try:
+        state: dict[str, Any] = json.loads((path / "run.json").read_text(encoding="utf-8"))
+        blueprint = Blueprint.model_validate(state["blueprint"])
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(path / "run.json", "no finished run", "a folder that calibrate wrote") from error
+    try:
+        data = az.from_netcdf(str(path / "posterior.nc"), engine="h5netcdf")
+        stored = data["sampler_coordinates"]
+        u, eta = stored["coordinates"].to_numpy(), stored["linear_coordinates"].to_numpy()
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(path / "posterior.nc", "no posterior", "the file that calibrate wrote") from error
+    model = build_model(blueprint)
+    u, eta, chains = u.reshape(-1, u.shape[-1]), eta.reshape(-1, eta.shape[-1]), u.shape[0]
+    return StoredRun(path, model, Draws(u, model.values(u), eta, chains), state)
+
+
+def material_of(path: Path) -> MaterialPosterior:
+    """The moduli that a RUN found, for ``moduli = "run:..."``; raises ``InputError`` where it has none."""
+    run = load_run(path)
+    names = [f"E_{k}" for k in range(1, run.model.blueprint.simulation.order + 1)]
+    listed = {item.name: item.draws for item in reported(run.model, run.draws)}
+    if not set(names) <= set(listed):
+        raise InputError(path / "run.json", "moduli that depend on pressure", "a run with a constant law")
+    draws = np.stack([listed[name] for name in names])
+    strain = run.model.blueprint.tensile_range or (0.0, 0.0)
+    return MaterialPosterior(
+        mean=tuple(float(v) for v in draws.mean(axis=1)),
+        covariance=tuple(tuple(float(v) for v in row) for row in np.atleast_2d(np.cov(draws))),
+        strain_range=strain,
+        convention=run.model.blueprint.simulation.strain,
+    )

@@ -1,0 +1,256 @@
+"""What a calibration's report shows, computed from its draws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpam_calib.calibration import Calibration
+from mpam_calib.model.model import CONTRACTION_SD
+from mpam_calib.model.noise import CORRELATED, TIME, WHITE
+from mpam_calib.model.readings import Readings
+from mpam_calib.model.remainder import ROUGH, SMOOTH
+from mpam_calib.model.tensile import MISFIT, NOISE
+from mpam_calib.posterior.draws import Draws, prior_draws
+from mpam_calib.posterior.points import KINDS
+from mpam_calib.prediction.bands import stress_draws
+from mpam_calib.report.view import OBSERVED_COLUMNS, CalibrationView, Convergence
+from mpam_calib.run.folder import versions
+from mpam_calib.run.strain_range import strain_range_table
+from mpam_calib.units import KPA
+
+Array = NDArray[np.float64]
+
+DRAWS = 200
+"""Draws behind the fitted value of each reading."""
+NOT_PHYSICS = (WHITE, CORRELATED, TIME, SMOOTH, ROUGH, NOISE, MISFIT, CONTRACTION_SD)
+BRANCH_WORDS = {1: "loading", -1: "unloading", 0: ""}
+PROVENANCE = {
+    "reconstructed": "These data are reconstructed from printed tables, not measured.",
+    "synthetic": "These data are synthetic: a simulation made them, not a rig.",
+    "digitised": "These data were digitised from a printed figure.",
+}
+
+
+def view_of(calibration: Calibration) -> CalibrationView:
+    """The report's view of a calibration."""
+    specimen, model, sampling = calibration.specimen, calibration.model, calibration.sampling
+    summary = calibration.summary
+    worst = summary.loc[summary["rhat"].idxmax()]
+    ensembles, steps, walkers, _ = sampling.chain.shape
+    observed, remainder, noise = _observed(calibration)
+    headline = _headline(calibration)
+    draws = {item.name: item.draws for item in calibration.reported if item.name in headline}
+    return CalibrationView(
+        name=specimen.name,
+        material=specimen.bladder_material,
+        simulation=specimen.simulation,
+        summary=summary,
+        bands=calibration.bands(),
+        observed=observed,
+        convergence=Convergence(
+            converged=calibration.converged,
+            rhat_max=float(worst["rhat"]),
+            rhat_parameter=str(worst["parameter"]),
+            ess_bulk_min=float(summary["ess_bulk"].min()),
+            ess_tail_min=float(summary["ess_tail"].min()),
+            ensembles=ensembles,
+            walkers=walkers,
+            steps=steps,
+            draws=len(calibration.draws),
+            acceptance=sampling.acceptance,
+            modes=len(sampling.modes),
+        ),
+        levels_kPa=tuple(_in_kpa(specimen.levels_Pa)),
+        draws=draws,
+        prior_draws=prior_draws(model, headline, calibration.seed),
+        headline=headline,
+        unidentified=_learnt(summary),
+        strain_range=strain_range_table(calibration) if model.setting is None else pd.DataFrame(),
+        settings=_settings(calibration),
+        data_files=pd.DataFrame(
+            [{"kind": f.kind, "file": f.name, "rows": f.rows} for f in specimen.files],
+            columns=["kind", "file", "rows"],
+        ),
+        warnings=_warnings(calibration),
+        provenance=_provenance(calibration),
+        remainder=remainder,
+        noise=noise,
+        pressure_bias_sd_kPa=specimen.sensors.pressure_bias_sd_kPa,
+    )
+
+
+def _in_kpa(levels: Array) -> Array:
+    return np.round(levels / KPA, 3)
+
+
+def _provenance(calibration: Calibration) -> str:
+    specimen = calibration.specimen
+    words = " ".join([specimen.name, *(f.name for f in specimen.files)]).lower()
+    return next((sentence for word, sentence in PROVENANCE.items() if word in words), "")
+
+
+def _headline(calibration: Calibration) -> list[str]:
+    """Friction, effects and rates first, then the law's coefficients, then noise: at most eight."""
+    names = [item.name for item in calibration.reported]
+    coefficients = [item.name for item in calibration.reported if not item.sampled]
+    physics = [name for name in names if name not in NOT_PHYSICS and name not in coefficients]
+    rest = [name for name in names if name in (WHITE, SMOOTH, NOISE)]
+    room = max(8 - len(rest) - len(physics), 0)
+    return [*physics, *coefficients[:room], *rest][:8]
+
+
+def _learnt(summary: pd.DataFrame) -> pd.DataFrame:
+    """What each parameter's posterior owes to the data."""
+    ratio = summary["sd"] / summary["prior_sd"].replace(0.0, np.nan)
+    return pd.DataFrame(
+        {
+            "parameter": summary["parameter"],
+            "prior_sd": summary["prior_sd"],
+            "posterior_sd": summary["sd"],
+            "contraction": (1.0 - ratio).fillna(0.0),
+            "sentence": "",
+        }
+    )
+
+
+def _settings(calibration: Calibration) -> dict[str, str]:
+    options = calibration.model.blueprint.options
+    return {
+        "seed": str(calibration.seed),
+        "effective draws wanted": f"{calibration.ess_wanted:g}",
+        "remainder": "yes" if options.remainder else "left out",
+        "correlated noise": "yes" if options.correlated_noise else "left out",
+        "data digest": calibration.specimen.digest[:16],
+        **{f"version of {name}": version for name, version in versions().items()},
+    }
+
+
+def _warnings(calibration: Calibration) -> list[str]:
+    blueprint = calibration.model.blueprint
+    warnings = list(calibration.specimen.notes)
+    if blueprint.material is not None:
+        low, high = blueprint.material.strain_range
+        warnings.append(
+            f"The moduli come from a tensile test between strains {low:g} and {high:g}; "
+            "a wall strained otherwise is extrapolated."
+        )
+    return warnings
+
+
+def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
+    """Reduced readings beside the declared simulation; the remainder's and the noise's size."""
+    model, data = calibration.model, calibration.target.data
+    draws = calibration.draws.thin(DRAWS)
+    frames = []
+    squares: list[Array] = []
+    if data.bins is not None:
+        middle = data.bins.middle()
+        fitted, parameter_sd, left = _fit(calibration, draws, middle)
+        rough = float(np.mean(draws.values[ROUGH] ** 2)) if ROUGH in draws.values else 0.0
+        frame = _frame("loops", middle, data.bins.force, data.bins.slack, calibration)
+        frame["stroke"] = data.bins.segment
+        frame["time_s"] = middle.time
+        frame["cycle"] = middle.cycle
+        frames.append(_close(frame, fitted, np.sqrt(parameter_sd**2 + left + rough + _noise(draws) ** 2)))
+        squares.append(left + rough)
+    if data.points is not None:
+        readings = data.points.readings
+        fitted, parameter_sd, left = _fit(calibration, draws, readings)
+        sd = np.sqrt(parameter_sd**2 + left + float(np.mean(draws.values[WHITE] ** 2)))
+        for number, kind in enumerate(KINDS):
+            rows = data.points.kind == number
+            if not rows.any():
+                continue
+            frame = _frame(
+                kind, readings.take(rows), data.points.force[rows], data.points.censored[rows], calibration
+            )
+            frame = _close(frame, fitted[rows], sd[rows])
+            if kind == "free_contraction" and calibration.target.guide.slope is not None:
+                assert model.setting is not None
+                # Newtons to contraction along the curve's slope there.
+                slope = calibration.target.guide.slope[rows] * model.setting.geometry.L0
+                frame["fitted_N"] = frame["contraction"] - fitted[rows] / slope
+                own = float(np.mean(draws.values[CONTRACTION_SD] ** 2))
+                frame["sd_N"] = np.sqrt((sd[rows] / slope) ** 2 + own)
+            frames.append(frame)
+            squares.append(left[rows])
+    if data.tensile is not None and model.tensile is not None:
+        frames.append(_tensile_frame(calibration, draws))
+    remainder = float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else float("nan")
+    noise = _noise(draws) if WHITE in draws.values else float("nan")
+    if model.setting is None and MISFIT in draws.values:
+        remainder = float(np.sqrt(np.mean(draws.values[MISFIT] ** 2)))
+        noise = float(np.mean(draws.values[NOISE]))
+    observed = (
+        pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(OBSERVED_COLUMNS))
+    )
+    return observed.reindex(columns=list(OBSERVED_COLUMNS)), remainder, noise
+
+
+def _noise(draws: Draws) -> float:
+    square = draws.values[WHITE] ** 2
+    if CORRELATED in draws.values:
+        square = square + draws.values[CORRELATED] ** 2
+    return float(np.sqrt(np.mean(square)))
+
+
+def _fit(calibration: Calibration, draws: Draws, readings: Readings) -> tuple[Array, Array, Array]:
+    """Mean and sd (n,) of the simulation without its remainder, and the remainder's mean square (n,)."""
+    model = calibration.model
+    assert model.chain is not None
+    p, q, _ = model.linear_sizes
+    force = model.chain.force(draws.values, draws.eta[:, :p], readings)
+    square = np.zeros(len(readings))
+    if model.remainder is not None:
+        surface = draws.eta[:, p : p + q] @ model.remainder.columns(readings).T
+        square = np.mean((draws.values[SMOOTH] * surface) ** 2, axis=0)
+    return force.mean(axis=0), force.std(axis=0), square
+
+
+def _frame(
+    kind: str, readings: Readings, force: Array, censored: NDArray[np.bool_], calibration: Calibration
+) -> pd.DataFrame:
+    specimen = calibration.specimen
+    assert specimen.geometry is not None
+    levels = _in_kpa(specimen.levels_Pa)
+    nearest = np.abs(readings.pressure[:, None] - specimen.levels_Pa).argmin(axis=1)
+    level = np.where(readings.level >= 0, readings.level, nearest)
+    return pd.DataFrame(
+        {
+            "kind": kind,
+            "level_kPa": levels[level],
+            "pressure_kPa": readings.pressure / KPA,
+            "contraction": readings.displacement / specimen.geometry.L0,
+            "branch": pd.Series(readings.sign.astype(int)).map(BRANCH_WORDS).to_numpy(),
+            "force_N": force,
+            "censored": censored,
+        }
+    )
+
+
+def _close(frame: pd.DataFrame, fitted: Array, sd: Array) -> pd.DataFrame:
+    return frame.assign(fitted_N=fitted, sd_N=sd)
+
+
+def _tensile_frame(calibration: Calibration, draws: Draws) -> pd.DataFrame:
+    tensile, model = calibration.target.data.tensile, calibration.model
+    assert tensile is not None
+    stress = stress_draws(model, draws, tensile.strain, remainder=False)
+    whole = stress_draws(model, draws, tensile.strain)
+    left = np.mean((whole - stress) ** 2, axis=0)
+    noise = float(np.mean(draws.values[NOISE] ** 2))
+    return pd.DataFrame(
+        {
+            "kind": "tensile",
+            "level_kPa": np.nan,
+            "pressure_kPa": np.nan,
+            "contraction": tensile.strain,
+            "branch": "",
+            "force_N": tensile.stress,
+            "fitted_N": stress.mean(axis=0),
+            "sd_N": np.sqrt(stress.var(axis=0) + left + noise),
+            "censored": False,
+        }
+    )
