@@ -96,6 +96,7 @@ class Oracle:
         self.forms = {f.id: f for f in candidates(recording)}
         self.nuisance = nuisance_of(case.muscle, self.rows, noise_sd(case.protocol))
         self.units = {i: f.unit(case.muscle, self.rows) for i, f in self.forms.items()}
+        self.strides = {i: self._stride(i) for i in self.forms}
         self.white = Whitener(case.protocol, self.rows.time[self.keep])
         self.target = self.white(recording.force[self.keep])
 
@@ -105,6 +106,14 @@ class Oracle:
         effects = [(self.forms[i], s) for i, s in sizes.items() if s != 0.0]
         out = force_of(self.nuisance.apply(free), self.rows, effects, self.rows.reading, case.seed)
         return out if case.protocol.floor_N is None else np.maximum(out, case.protocol.floor_N)
+
+    def _stride(self, effect: str) -> float:
+        """The unit, or less where a unit changes the force by over 20 noise sds (cancelling free moduli)."""
+        noise = noise_sd(self.recording.case.protocol)
+        free = np.zeros(self.nuisance.count)
+        change = self.force({effect: self.units[effect]}, free) - self.force({}, free)
+        rms = float(np.sqrt(np.mean(change**2)))
+        return self.units[effect] * min(1.0, 20.0 * noise / max(rms, 1e-12))
 
     def _prior_sd(self, ids: Key) -> Array:
         return np.array([1.0 if i == "braid_kinematics" else 2.0 * self.units[i] for i in ids])
@@ -118,7 +127,7 @@ class Oracle:
             out[:, j] = (self.force(sizes, moved) - base)[self.keep] / self.nuisance.step[j]
         for j, i in enumerate(ids):
             at = sizes.get(i, 0.0)
-            change = 1.0 if i == "braid_kinematics" else step * self.units[i]
+            change = 1.0 if i == "braid_kinematics" else step * self.strides[i]
             if i == "braid_kinematics" and at == 1.0:
                 change = -1.0
             difference = self.force({**sizes, i: at + change}, free) - base
@@ -137,7 +146,8 @@ class Oracle:
         ids = tuple(sorted(ids))
         fixed = {i: 1.0 for i in ids if i == "braid_kinematics"}
         moving = tuple(i for i in ids if i not in fixed)
-        sizes = {i: self._allowed(i, (start or {}).get(i, 0.3 * self.units[i])) for i in moving} | fixed
+        known = start or {}
+        sizes = {i: self._allowed(i, known.get(i, self._beginning(i))) for i in moving} | fixed
         free = np.zeros(self.nuisance.count) if free is None else free.copy()
         base = self.force(sizes, free)
         value = self._objective(base, sizes, free, moving)
@@ -148,9 +158,9 @@ class Oracle:
             scaled = jacobian * sd
             normal = scaled.T @ scaled + np.eye(sd.size)
             residual = self.target - self.white(base[self.keep])
-            move = np.linalg.solve(normal, scaled.T @ residual - at / sd) * sd
+            move = self._step(normal, scaled.T @ residual - at / sd, at / sd, moving) * sd
             gain = 0.0
-            for damping in (1.0, 0.5, 0.2, 0.05):
+            for damping in (1.0, 0.5, 0.2, 0.05, 0.01):
                 new = at + damping * move
                 trial = {i: self._allowed(i, v) for i, v in zip(moving, new[free.size:], strict=True)} | fixed
                 force = self.force(trial, new[:free.size])
@@ -163,6 +173,27 @@ class Oracle:
         _, logdet = np.linalg.slogdet(normal)
         one_sided = sum(not self.forms[i].signed for i in moving)
         return Fit(ids, value - 0.5 * float(logdet) + one_sided * float(np.log(2.0)), sizes, free, base)
+
+    def _step(self, normal: Array, right: Array, at: Array, moving: Key) -> Array:
+        """Newton step; one-signed sizes that would turn negative are held at zero, the rest solved again."""
+        q = self.nuisance.count
+        one_signed = np.array([False] * q + [not self.forms[i].signed for i in moving])
+        held = np.zeros(at.size, dtype=bool)
+        move: Array = np.zeros(at.size)
+        for _ in range(len(moving) + 1):
+            move[held] = -at[held]
+            free = ~held
+            target = right[free] - normal[np.ix_(free, held)] @ move[held]
+            move[free] = np.linalg.solve(normal[np.ix_(free, free)], target)
+            beyond = one_signed & free & (at + move < 0.0)
+            if not beyond.any():
+                break
+            held |= beyond
+        return move
+
+    def _beginning(self, effect: str) -> float:
+        """Small, so that a larger set begins where the smaller one ended; presliding needs rows inside it."""
+        return 0.3 * self.units[effect] if effect == "presliding" else 0.02 * self.strides[effect]
 
     def _allowed(self, effect: str, size: float) -> float:
         limit = 1.5 * self.forms[effect].high * self.units[effect]
@@ -192,7 +223,7 @@ class Oracle:
             out |= {tuple(ids[j] for j in members): float(v) for members, v in zip(sets, value, strict=True)}
         return out
 
-    def judge(self, refits: int = 8) -> Verdict:
+    def judge(self, refits: int = 16) -> Verdict:
         """Refit the truth and its strongest rivals exactly."""
         case = self.recording.case
         truth = case.ids

@@ -78,7 +78,9 @@ def _half_stroke(motion: str, speed: float, stroke: float, dwell: float,
                  dt: float) -> tuple[Array, Array, float]:
     """Times within one half cycle, way covered [0..stroke], and its duration; `speed` is the mean speed."""
     duration = stroke / speed
-    times = np.arange(0.0, duration + dwell, dt)
+    # Half a step off the reversal: what friction does at the very turn is not defined.
+    times = dt * (np.arange(int(np.ceil((duration + dwell) / dt - 1e-9))) + 0.5)
+    times = times[times < duration + dwell]
     phase = np.minimum(times / duration, 1.0)
     way = stroke * (phase if motion == "triangle" else 0.5 * (1.0 - np.cos(np.pi * phase)))
     return times, way, duration + dwell

@@ -125,8 +125,8 @@ def solved_size(wanted: Wanted, muscle: Muscle, rows: Rows, noise: float, seed: 
 
 def _stopped_at_zero_force(p: Protocol, muscle: Muscle, rows: Rows, hidden: tuple[Hidden, ...],
                            recipe: Recipe) -> Protocol:
-    """Nobody pushes a muscle together: strokes end before the hidden effects bring the force to zero."""
-    if not hidden or recipe.floor:
+    """Nobody pushes a muscle together: strokes end before the true force (friction and all) is zero."""
+    if recipe.floor:
         return p
     force = force_of(muscle, rows, [(form(h.id, h.form), h.size) for h in hidden], seed=recipe.seed)
     strokes = []
@@ -156,6 +156,6 @@ def build_case(recipe: Recipe) -> Case:
 
 
 def halved(case: Case) -> Case:
-    """The same case with every effect at half its size (a parameterless one stays)."""
+    """The same case with every effect at half its size; kinematics are one or the other and stay."""
     hidden = tuple(h if h.id == "braid_kinematics" else replace(h, size=0.5 * h.size) for h in case.hidden)
     return replace(case, hidden=hidden)

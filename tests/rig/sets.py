@@ -61,8 +61,10 @@ LOCKED_HALF = Half(
 
 
 def _wanted(half: Half, rng: random.Random, effect: str, low: float, high: float) -> Wanted:
+    """A form, a size uniform in its logarithm, and a sign."""
     name = shared_form(effect).name if rng.random() < 0.5 else rng.choice(half.other[effect])
-    return Wanted(effect, name, round(rng.uniform(low, high), 3), rng.choice((-1, 1)))
+    multiple = low * (high / low) ** rng.random()
+    return Wanted(effect, name, float(f"{multiple:.3g}"), rng.choice((-1, 1)))
 
 
 def _base(half: Half, rng: random.Random, group: str, design: str, index: int, **fields: object) -> Recipe:
@@ -130,7 +132,7 @@ def _separable(half: Half, rng: random.Random, index: int) -> Recipe:
         if {pick, *chosen} >= {"coulomb_friction", "strand_friction"} or pick in chosen:
             continue
         chosen.append(pick)
-    effects = tuple(_wanted(half, rng, i, 3.0, 9.0) for i in sorted(chosen))
+    effects = tuple(_wanted(half, rng, i, 1.0, 9.0) for i in sorted(chosen))
     fields = _suited(effects, rng) | (_loops_fields(rng) if loops else {})
     return _base(half, rng, "separable", "loops" if loops else "tensile", index, effects=effects, **fields)
 

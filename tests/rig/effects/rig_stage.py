@@ -22,17 +22,21 @@ def _sharp(state: State, size: float) -> None:
 
 
 def _softplus(state: State, size: float) -> None:
-    """P -> w log(1 + exp((P - P_DB)/w)), w = 0.4 P_DB: the liner meets the braid a little at a time."""
-    if size != 0.0:
-        w = 0.4 * abs(size)
-        state.pressure = w * np.logaddexp(0.0, (state.pressure - size) / w)
+    """P -> P - [h(P) - h(P - P_DB)], h(p) = w log(1 + exp(p/w)), w = 0.12 P_max: a soft onset.
+
+    The whole band is lost at high pressure, less of it where the liner only begins to meet the braid.
+    """
+    w = 0.12 * float(state.rows.setpoint.max())
+    p = state.pressure
+    lost = w * (np.logaddexp(0.0, p / w) - np.logaddexp(0.0, (p - size) / w))
+    state.pressure = np.maximum(p - lost, 0.0)
 
 
 def _closing_gap(state: State, size: float) -> None:
-    """P -> P - P_DB (1 - exp(-P / (0.7 P_DB))): zero at P = 0, the whole band once the gap is closed."""
-    if size != 0.0:
-        p = np.maximum(state.pressure, 0.0)
-        state.pressure = p - size * (1.0 - np.exp(-p / (0.7 * abs(size))))
+    """P -> P - P_DB (1 - exp(-P / p1)), p1 = 0.15 P_max: the gap closes as the pressure rises."""
+    p1 = 0.15 * float(state.rows.setpoint.max())
+    p = state.pressure
+    state.pressure = np.maximum(p - size * (1.0 - np.exp(-p / p1)), 0.0)
 
 
 def _dead_band_unit(m: Muscle, rows: Rows) -> float:
