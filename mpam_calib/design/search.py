@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -17,10 +18,11 @@ from scipy import optimize
 from scipy.optimize import Bounds, NonlinearConstraint
 
 from mpam_calib.design.gradient import gradient, in_box
-from mpam_calib.design.problem import Problem
+from mpam_calib.design.problem import Constraint, Problem
 
 Array = NDArray[np.float64]
 Local = Literal["SQP", "IP"]
+_Function = Callable[[Array], Array]
 
 # Through Any: the stubs know neither vectorised objectives nor constraints as dictionaries.
 _differential_evolution: Any = optimize.differential_evolution
@@ -171,7 +173,13 @@ def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float
         # Its own gradient test can stop it while the barrier still holds the design off its bounds.
         return bool(state.barrier_parameter < BARRIER and state.optimality < 1e-8)
 
-    constraints = [(lambda v, c=c: c.value(problem.unscaled(full(v)))) for c in problem.constraints]
+    def held(constraint: Constraint) -> tuple[_Function, _Function]:
+        def value(v: Array) -> Array:
+            return constraint.value(problem.unscaled(full(v)))
+
+        return value, lambda v: gradient(value, v)
+
+    constraints = [held(c) for c in problem.constraints]
     v0 = np.clip(base[free], 0.0, 1.0)
     if method == "SQP":
         result = _minimize(
@@ -180,9 +188,7 @@ def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float
             jac=lambda v: gradient(f, v),
             method="SLSQP",
             bounds=Bounds(0.0, 1.0),
-            constraints=[
-                {"type": "ineq", "fun": g, "jac": lambda v, g=g: gradient(g, v)} for g in constraints
-            ],
+            constraints=[{"type": "ineq", "fun": g, "jac": slope} for g, slope in constraints],
             options={"ftol": 1e-13, "maxiter": 200},
             callback=sqp_step,
         )
@@ -196,10 +202,7 @@ def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float
             method="trust-constr",
             bounds=Bounds(0.0, 1.0),
             constraints=[
-                NonlinearConstraint(
-                    g, 0.0, np.inf, jac=lambda v, g=g: gradient(g, v)[None, :], hess="2-point"
-                )
-                for g in constraints
+                NonlinearConstraint(g, 0.0, np.inf, jac=slope, hess="2-point") for g, slope in constraints
             ],
             options={"gtol": 1e-300, "xtol": 1e-300, "barrier_tol": BARRIER / 10.0, "maxiter": 500},
             callback=ip_step,

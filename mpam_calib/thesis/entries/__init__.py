@@ -1,0 +1,1 @@
+"""What is entered in the ledger, one module for each part of the thesis."""

@@ -1,0 +1,138 @@
+"""Tables 4.1, 4.2 and 4.6: the material's moduli, and the order of the polynomial."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mpam_calib.thesis import decoded, laws, orders
+from mpam_calib.thesis.ledger import FROM_MEASUREMENT, Ledger
+from mpam_calib.thesis.statistics import scaled_condition
+from mpam_calib.thesis.tables import PrintedTable, table
+from mpam_calib.thesis.tensile import RANGES, ecoflex, tensile_fit
+
+
+@dataclass(frozen=True)
+class OrderTable:
+    """A table of order selection: the contraction up to which it is fitted, and the fits themselves."""
+
+    muscle: str
+    printed: PrintedTable
+    limit: float
+    fits: list[orders.Fit]
+
+
+def tables() -> tuple[OrderTable, OrderTable]:
+    """Tables 4.2 and 4.6 on the decoded curves (the material's moduli only in the first)."""
+    found = []
+    for muscle, name, highest in (("MPAM1", "4.2", 5), ("MPAM2", "4.6", 6)):
+        printed = table(name)
+        limit = orders.range_from_print(muscle, printed.value("R^2", "F_{G+t}"))
+        fits = orders.order_table(muscle, limit, range(1, highest + 1))
+        found.append(OrderTable(muscle, printed, limit, fits if muscle == "MPAM1" else [fits[0], *fits[2:]]))
+    return found[0], found[1]
+
+
+def enter(ledger: Ledger) -> None:
+    """Enter Tables 4.1, 4.2, 4.6, and the joint fits that judge order and law."""
+    _table_4_1(ledger)
+    for selection in tables():
+        _selection(ledger, selection)
+    _joint_fits(ledger)
+
+
+def _table_4_1(ledger: Ledger) -> None:
+    printed = table("4.1")
+    column = printed.columns[0]
+    strain, stress = ecoflex()
+    spans = [tensile_fit(strain, stress, *span) for span in RANGES]
+    own = next(fit for fit in spans if (fit.low, fit.high) == (0.1, 3.0))
+    for k, row in enumerate(printed.rows):
+        others = ", ".join(f"{f.moduli[k]:.3g} to {f.high:g}" for f in spans)
+        ledger.lost(
+            printed.source,
+            row,
+            column,
+            printed.text(row, column),
+            f"{FROM_MEASUREMENT}, and the strain range is not printed. Computed: the same method on a "
+            "measured curve of "
+            f"Ecoflex 00-50 (Marechal et al. 2020), strain 0.1 to 3; by upper strain: {others}",
+            own.moduli[k],
+        )
+
+
+def _selection(ledger: Ledger, selection: OrderTable) -> None:
+    printed = selection.printed
+    for column, fit in zip(printed.columns, selection.fits, strict=True):
+        honest = f"1 − SSE/SST is {fit.determination:.4f}, rms {fit.rmse_N:.2f} N"
+        if column == "F_{G+t}":
+            note = f"used to find the range of the fit, γ <= {selection.limit:.4f}; {honest}"
+        elif fit.determination > 0.99999:
+            note = "the decoded curve is this polynomial itself, so that its R² is 1 by construction"
+        else:
+            note = (
+                f"on the decoded curve (the measured average is lost), γ <= {selection.limit:.4f}; {honest}"
+            )
+        text = printed.text("R^2", column)
+        worse = selection.muscle == "MPAM2" and fit.model in ("M = 4", "M = 6")
+        if worse:
+            ledger.contradicted(
+                printed.source,
+                "R^2",
+                column,
+                text,
+                fit.squared_correlation,
+                "below the R² of the order before it, impossible for converged least squares of nested "
+                "polynomials: not "
+                f"converged. {note[0].upper()}{note[1:]}",
+            )
+        else:
+            ledger.lost(printed.source, "R^2", column, text, note, fit.squared_correlation)
+    # The reading in strains, which Eq. 4.5 prints, does not give the table.
+    for order in (1, 2, 3):
+        strain = orders.order_fit(selection.muscle, selection.limit, order, "engineering")
+        ledger.unprinted(
+            printed.source,
+            "R^2",
+            f"M = {order} in strains, as Eq. 4.5 prints",
+            strain.squared_correlation,
+            "on the decoded curve; stretches come nearer to the print",
+        )
+    whole = decoded.first_root(2e5, decoded.moduli(selection.muscle)[orders.LEVEL])
+    gas = orders.order_table(selection.muscle, whole, range(1, 2))[0]
+    ledger.unprinted(
+        printed.source,
+        "1 − SSE/SST",
+        "F_{G+t} to free contraction",
+        gas.determination,
+        f"the squared correlation there is {gas.squared_correlation:.4f}: the two kinds of R² must not be "
+        "compared",
+    )
+
+
+def _joint_fits(ledger: Ledger) -> None:
+    source = "Eq. 4.7, 4.8 fitted jointly to the force of MPAM2"
+    linear = laws.linear_basis()
+    fits = [laws.joint("MPAM2", M, linear, "linear") for M in (3, 4, 5)]
+    fits += [
+        laws.joint_exponential("MPAM2", 4),
+        laws.joint_double_exponential("MPAM2", 4),
+        laws.joint("MPAM2", 4, np.eye(5), "free at each level"),
+        laws.joint("MPAM2", 4, linear, "linear, without 50 kPa", slice(1, None)),
+    ]
+    for fit in fits:
+        name = f"{fit.law}, M = {fit.order}"
+        rates = f"; rates {', '.join(f'{r:.6f}' for r in fit.rates)} per kPa" if fit.rates else ""
+        note = f"γ = 0 (0.005) 0.29, 59 points a level, {fit.n_constants} constants{rates}"
+        ledger.unprinted(source, name, "rms (N)", fit.rmse_N, note)
+        ledger.unprinted(source, name, "1 − SSE/SST", fit.r2, note)
+    for order in (4, 5, 6):
+        X = decoded.columns(np.linspace(0.0, 0.33, 100), order)
+        ledger.unprinted(
+            "Eq. 4.10",
+            f"M = {order}",
+            "condition number of the scaled columns",
+            scaled_condition(X),
+            "γ = 0 to 0.33: the polynomial basis is ill-conditioned",
+        )

@@ -1,0 +1,200 @@
+"""Where the print is wrong, what is read instead, and the proof: computed when asked for, never quoted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mpam_calib.thesis import decoded, laws, orders
+from mpam_calib.thesis.ledger import MISPRINT, Ledger
+from mpam_calib.thesis.tables import table
+
+
+@dataclass(frozen=True)
+class Erratum:
+    """One place of the thesis: what it prints, how this package reads it, why."""
+
+    place: str
+    printed: str
+    reading: str
+    proof: str
+
+
+def errata(ledger: Ledger) -> list[Erratum]:
+    """Errors of equations and statements first, then every misprinted number of the ledger."""
+    return [*_readings(), *_equations(), *(_of_number(ledger))]
+
+
+def _of_number(ledger: Ledger) -> list[Erratum]:
+    return [
+        Erratum(
+            f"{r.source}, {r.row}, {r.column}",
+            r.printed,
+            f"{r.computed:.6g}",
+            f"{r.note[:1].upper()}{r.note[1:]}.",
+        )
+        for r in ledger.rows
+        if r.verdict == MISPRINT
+    ]
+
+
+def _readings() -> list[Erratum]:
+    """What has to be read otherwise for the tables to describe a muscle at all."""
+    E = decoded.moduli("MPAM1")
+    P, gamma = np.asarray(2e5), np.array([0.1, 0.3])
+    strain = decoded.force(P, gamma, E[3], "engineering")
+    limit = orders.range_from_print("MPAM1", 0.8838)
+    kinds = {
+        kind: [orders.order_fit("MPAM1", limit, M, kind).squared_correlation for M in (1, 2, 3)]
+        for kind in ("stretch", "engineering")
+    }
+    gas = orders.order_table("MPAM1", decoded.first_root(2e5, E[3]), range(1, 2))[0]
+    root = 100.0 * decoded.first_root(2.5e5, E[4])
+    law = laws.double_exponential(table("4.9").values(), laws.P_KPA)
+    lost = decoded.force(decoded.LEVELS, np.asarray(0.0), law)
+    return [
+        Erratum(
+            "Eq. 2.13-2.17, 4.5, 4.6, 4.10-4.12, 4.18",
+            "Strains L/L0 − 1, R/R0 − 1 in the stress polynomials",
+            "Stretches L/L0, R/R0; R from Eq. 4.16, α from Eq. 4.15, in the form of Eq. 4.6",
+            f"With Table 4.3 at 200 kPa strains give {strain[0]:.0f} N at γ = 0.1 and {strain[1]:.0f} N "
+            "at 0.3. Stretches "
+            f"give curves that fall to 0 at {root:.1f} % (250 kPa; Table 4.12: 33.2 %). Refitted for M = "
+            "1, 2, 3, "
+            f"R² is {_three(kinds['stretch'])} with stretches and {_three(kinds['engineering'])} with "
+            "strains; "
+            "Table 4.2 has 0.8784, 0.8771, 0.9780.",
+        ),
+        Erratum(
+            "Table 4.9 (Eq. 4.8)",
+            "Constants of each modulus, validated by R² of 0.986 to 0.9997",
+            "Not used for the force; laws are fitted to the force of all levels jointly",
+            f"The R² reproduce, and the law gives {', '.join(f'{f:.0f}' for f in lost)} N at γ = 0 where "
+            "Table 4.7 "
+            "decodes to 20, 42, 74, 96, 118 N: the moduli are about 1e9 Pa and cancel to 1e5.",
+        ),
+        Erratum(
+            "Tables 4.2, 4.6, 4.8, 4.11",
+            "R² as coefficient of determination of a force",
+            "Squared correlation; 1 − SSE/SST is given beside it",
+            "F_{G+t} of MPAM1 to free contraction has a squared correlation of "
+            f"{gas.squared_correlation:.2f} and 1 − SSE/SST of {gas.determination:.2f}.",
+        ),
+        Erratum(
+            "Eq. 4.5, 4.17",
+            "Relative least squares",
+            "Absolute least squares in the package; the relative kind only to repeat the thesis",
+            "Residuals are divided by a force that goes to 0 at free contraction, so that the blocked "
+            "force counts "
+            "least; it is also why f_s comes out at the lower bound of its range (Fig. 4.20).",
+        ),
+    ]
+
+
+def _equations() -> list[Erratum]:
+    return [
+        Erratum(
+            "Eq. 2.44 in 4.13",
+            "F_F = −K_f F sgn(V), then ± F_F",
+            "F(1 + K_f) on loading, F(1 − K_f) on unloading",
+            "Put into 4.13 the direction would count twice.",
+        ),
+        Erratum(
+            "Eq. 2.48",
+            "F = |F_ideal| − |F_braid| − |F_nonlinearity| ∓ |F_f|",
+            "F_NL is added with its sign",
+            f"F_NL of MPAM1 at 200 kPa, γ = 0.05 is {_nonlinear(0.05):+.1f} N.",
+        ),
+        Erratum(
+            "Eq. 4.9",
+            "F_th = F_{G+t} + F_br + F_NL",
+            "F_br is subtracted, as in Eq. 2.26 and 3.10",
+            "It is a loss.",
+        ),
+        Erratum(
+            "Eq. 4.15",
+            "L = L0 ± ΔL, plus during expansion",
+            "L = L0 − ΔL on both branches",
+            "Length depends on position, not on the direction of motion; the muscle never exceeds L0 in "
+            "the test.",
+        ),
+        Erratum(
+            "Eq. 2.18",
+            "F = P dV/dL",
+            "F = −P dV/dL",
+            "The muscle pulls where its volume grows while it shortens.",
+        ),
+        Erratum(
+            "Eq. 2.40, 2.42",
+            "S_contact / S_scale with S_scale a ratio of lengths",
+            "Eq. 2.43 as printed, called empirical",
+            "An area has to be scaled by a ratio of areas; the friction would then be 0.12 N at 200 kPa.",
+        ),
+        Erratum(
+            "Eq. 2.42, middle form",
+            "(P D_s² (D_s/2) / E_br)",
+            "With E* of Eq. 2.41 a factor 2(1 − ν_s²) stands beside it",
+            "The last form has it again.",
+        ),
+        Erratum(
+            "Eq. 3.15, 3.18",
+            "V_bl/V <= 2",
+            "Never binds",
+            "(t/R)(2 − t/R) is at most 1, at t = R.",
+        ),
+        Erratum(
+            "Text 3.4.3",
+            "'the optimization formulation including the braid term (Case II)'",
+            "Case I",
+            "Case II is the one without the braid term (3.2.2).",
+        ),
+        Erratum(
+            "Table 4.12, title",
+            "P = 300 kPa",
+            "Free contraction at 250 kPa",
+            "Free contraction was measured from 50 to 250 kPa (4.3); the decoded roots at 250 kPa are the "
+            "printed values.",
+        ),
+        Erratum(
+            "Text 4.6.1.2",
+            "MPAM2 requires a fifth-degree polynomial",
+            "Order 4 does as well",
+            f"Fitted jointly, linear in P, order 4 leaves "
+            f"{laws.joint('MPAM2', 4, laws.linear_basis(), '').rmse_N:.2f} N and "
+            f"order 5 {laws.joint('MPAM2', 5, laws.linear_basis(), '').rmse_N:.2f} N; at 200 kPa order 4 "
+            "matches the decoded "
+            f"fifth-order curve to {_order_four():.2f} N rms.",
+        ),
+        Erratum(
+            "Fig. 4.19, Eq. 4.8",
+            "Moduli that saturate above 100 kPa, explained by cross-linking",
+            "One outlying level",
+            "The moduli at 50 kPa are a hundred times smaller than the others and the curve there falls to "
+            f"{_fall(0):.2f} of its blocked force at γ = 0.05 (the others to "
+            f"{_fall(1):.2f}-{_fall(4):.2f}). Four constants "
+            "describe five points, and w exp(zP) matters at that one alone. Without it a linear law of "
+            "order 4 leaves "
+            f"{laws.joint('MPAM2', 4, laws.linear_basis(), '', slice(1, None)).rmse_N:.2f} N.",
+        ),
+    ]
+
+
+def _three(values: list[float]) -> str:
+    return ", ".join(f"{v:.3f}" for v in values)
+
+
+def _nonlinear(gamma: float) -> float:
+    P, g = np.asarray(2e5), np.asarray(gamma)
+    return float(decoded.force(P, g, decoded.moduli("MPAM1")[3]) - decoded.gas_and_thickness(P, g))
+
+
+def _order_four() -> float:
+    limit = orders.range_from_print("MPAM2", 0.8879)
+    return orders.order_fit("MPAM2", limit, 4).rmse_N
+
+
+def _fall(level: int) -> float:
+    E = decoded.moduli("MPAM2")[level]
+    F = decoded.force(decoded.LEVELS[level], np.array([0.0, 0.05]), E)
+    return float(F[1] / F[0])

@@ -1,0 +1,81 @@
+"""Order selection as in Tables 4.2 and 4.6, on the decoded average curve at 200 kPa."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from mpam_calib.thesis import decoded
+from mpam_calib.thesis.statistics import determination, least_squares, rmse, squared_correlation
+
+Array = NDArray[np.float64]
+
+LEVEL = 3
+"""200 kPa, the level that the two tables are for."""
+POINTS = 400
+MATERIAL = np.array([3.769e4, 2.676e4])
+"""Table 4.1, Pa."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One force model against the decoded average: both kinds of R² and the residual, N."""
+
+    model: str
+    squared_correlation: float
+    determination: float
+    rmse_N: float
+
+
+def curve(muscle: str, limit: float) -> tuple[Array, Array]:
+    """Contraction from 0 to ``limit`` and the decoded force (N) at 200 kPa."""
+    gamma = np.linspace(0.0, limit, POINTS)
+    P = decoded.LEVELS[LEVEL]
+    return gamma, decoded.force(P, gamma, decoded.moduli(muscle)[LEVEL])
+
+
+def gas_correlation(muscle: str, limit: float) -> float:
+    """The thesis's R² of F_{G+t} over contractions up to ``limit``."""
+    gamma, F = curve(muscle, limit)
+    return squared_correlation(decoded.gas_and_thickness(decoded.LEVELS[LEVEL], gamma), F)
+
+
+def range_from_print(muscle: str, printed: float) -> float:
+    """The contraction up to which F_{G+t} has the printed R².
+
+    The thesis does not say how far its fit ran. This one printed cell, which no modulus enters, fixes it;
+    every other cell of the table is then computed without further choice.
+    """
+    # R² falls with the range here; beyond 0.9 of free contraction relative residuals blow up.
+    low, high = 0.15, 0.95 * decoded.first_root(2e5, decoded.moduli(muscle)[LEVEL])
+    if (gas_correlation(muscle, low) - printed) * (gas_correlation(muscle, high) - printed) > 0:
+        return float("nan")
+    return float(brentq(lambda g: gas_correlation(muscle, g) - printed, low, high, xtol=1e-6))
+
+
+def order_fit(muscle: str, limit: float, order: int, convention: str = "stretch") -> Fit:
+    """Moduli of one order fitted by Eq. 4.5's relative least squares."""
+    gamma, F = curve(muscle, limit)
+    G = decoded.gas_and_thickness(decoded.LEVELS[LEVEL], gamma)
+    X = decoded.columns(gamma, order, convention)
+    return _fit(f"M = {order}", G + X @ least_squares(X, F - G, 1.0 / F), F)
+
+
+def order_table(muscle: str, limit: float, orders: range, convention: str = "stretch") -> list[Fit]:
+    """F_{G+t}, with the material's moduli (Table 4.1), then with fitted moduli of each order."""
+    gamma, F = curve(muscle, limit)
+    P = decoded.LEVELS[LEVEL]
+    rows = [
+        _fit("F_{G+t}", decoded.gas_and_thickness(P, gamma), F),
+        _fit("E_k of the material", decoded.force(P, gamma, MATERIAL, "engineering"), F),
+    ]
+    return rows + [order_fit(muscle, limit, order, convention) for order in orders]
+
+
+def _fit(model: str, fitted: Array, observed: Array) -> Fit:
+    return Fit(
+        model, squared_correlation(fitted, observed), determination(fitted, observed), rmse(fitted, observed)
+    )

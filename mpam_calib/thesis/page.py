@@ -1,0 +1,218 @@
+"""The reproduction's report: errata first, tables side by side, figures redrawn."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from mpam_calib.report.page import (
+    Block,
+    DataTable,
+    Figure,
+    Headline,
+    KeyNumber,
+    Notice,
+    Numbers,
+    Page,
+    Section,
+    Text,
+)
+from mpam_calib.thesis import errata as printed_errors
+from mpam_calib.thesis import orders
+from mpam_calib.thesis.chapter3 import MONOFILAMENTS, Chapter3, best_force, loss
+from mpam_calib.thesis.figures import muscles, optimisation
+from mpam_calib.thesis.ledger import MISPRINT, NOT_REPRODUCIBLE, REPRODUCED, Ledger
+from mpam_calib.thesis.posterior import MuscleBands, table_4_12
+from mpam_calib.thesis.reproduction import Reproduction
+from mpam_calib.thesis.tables import NAMES, table
+
+COMPARED_AT = {"Blocked Force (N)": 300.0, "Free Contraction (%)": 250.0}
+
+
+def page(result: Reproduction, bands: dict[str, MuscleBands] | None = None) -> Page:
+    """The whole page; ``bands`` puts a posterior beside Table 4.12 and into the figures that can show it."""
+    bands = bands or {}
+    return Page(
+        "The thesis, recomputed",
+        "Every printed number held against its own equations",
+        lead=_lead(result.ledger),
+        sections=[
+            _errata(result.ledger),
+            _optimiser(result.chapter3),
+            *_tables(result.ledger),
+            _unprinted(result.ledger),
+            _figures(result.chapter3, bands),
+            *([_comparison(bands)] if bands else []),
+        ],
+        footer="S. Zabihollah, Modelling, Design Optimization, and Experimental Characterization of "
+        "Miniaturized "
+        "Pneumatic Artificial Muscles (thesis).",
+    )
+
+
+def _lead(ledger: Ledger) -> list[Block]:
+    n = ledger.counts()
+    return [
+        Headline(
+            f"Of {n[REPRODUCED] + n[MISPRINT] + n[NOT_REPRODUCIBLE]} printed numbers {n[REPRODUCED]} are "
+            "reproduced, "
+            f"{n[MISPRINT]} contradict the thesis's own equations or tables, and {n[NOT_REPRODUCIBLE]} need "
+            "measurements that are lost."
+        ),
+        Numbers(
+            [
+                KeyNumber("reproduced", str(n[REPRODUCED]), note="to the printed digits and their rounding"),
+                KeyNumber("misprint", str(n[MISPRINT]), note="each with its proof below"),
+                KeyNumber("not reproducible", str(n[NOT_REPRODUCIBLE]), note="measured curves are lost"),
+                KeyNumber("recomputed besides", str(n["unprinted"]), note="values not printed as numbers"),
+            ]
+        ),
+        Notice(
+            "Nothing here was measured by us. The thesis's measured loops are lost; curves of its two "
+            "muscles are "
+            "reconstructed from the moduli that it prints, and are the image of polynomials, not of a test."
+        ),
+    ]
+
+
+def _errata(ledger: Ledger) -> Section:
+    found = printed_errors.errata(ledger)
+    frame = pd.DataFrame(
+        [(e.place, e.printed, e.reading, e.proof) for e in found],
+        columns=["where", "printed", "read as", "proof"],
+    )
+    return Section(
+        "Errata",
+        [DataTable(frame, f"{len(found)} places where the print is not followed, and why.")],
+        note="Numbers in the proofs are computed by this run.",
+    )
+
+
+def _optimiser(chapter: Chapter3) -> Section:
+    one, two = chapter.optimality
+    active = pd.DataFrame(
+        [
+            (case, a.name, a.multiplier, f"N per {a.unit}" if a.unit != "1" else "N per unit")
+            for case, found in (("I", one), ("II", two))
+            for a in found.active
+        ],
+        columns=["case", "active bound or constraint", "multiplier", "unit"],
+    )
+    starts = chapter.starts
+    packed, thin = chapter.packed.best, chapter.packed_monofilament.best
+    losses = ", ".join(f"{loss(200, r * 1e3, 50):.1f} N at {r * 1e3:.2f} mm" for r in MONOFILAMENTS)
+    return Section(
+        "Design optimisation",
+        [
+            Text(
+                f"{starts.runs} searches of Case II from random populations, their evolutionary stage cut "
+                "short at 6 "
+                f"generations ({starts.lowest_global:.1f} to {starts.highest_global:.1f} N, as scattered "
+                "as Table 3.3): SQP then "
+                f"reached {best_force(200):.5f} N to 1e-5 N in {starts.reached_sqp} of them, interior "
+                f"point in {starts.reached_ip}, "
+                f"with {starts.evaluations_mean:.0f} evaluations on average for all three stages, those "
+                "for gradients included."
+            ),
+            DataTable(
+                active,
+                f"What holds the optimum at 200 kPa, and what it would gain if relaxed. Largest part of "
+                "the gradient that they do "
+                f"not balance: {max(one.residual, two.residual):.1e}.",
+            ),
+            Text(
+                f"Case I ends at n = {chapter.case_one.best.x[4]:.0f} strands of R_br = "
+                f"{chapter.case_one.best.x[3] * 1e3:.1f} mm, of which at most 3 "
+                f"in each direction fit round the muscle. With strands that must fit, the braid takes "
+                f"{best_force(200) - packed.value:.3f} N instead of "
+                f"{best_force(200) - chapter.case_one.best.value:.5f} N "
+                f"(n = {packed.x[4]:.0f}, R_br = {packed.x[3] * 1e3:.2f} mm); with strands no thicker "
+                "than a real monofilament "
+                f"{best_force(200) - thin.value:.2f} N (n = {thin.x[4]:.0f}, R_br = {thin.x[3] * 1e3:.2f} "
+                f"mm), and with 50 of them {losses}. That the "
+                "braid's term is negligible follows from strands that no braid has."
+            ),
+            Figure(optimisation.histories(chapter), "Objective by iteration.", "convergence curves"),
+            Figure(optimisation.three_force_models(), "Three force models.", "lines over pressure"),
+            Figure(optimisation.by_pressure(chapter), "Optimum by pressure.", "line with printed points"),
+            Figure(
+                optimisation.sensitivity(chapter),
+                "Post-optimality: R and α one at a time, the wall through the bound of V_bl/V, each ± 5 %.",
+                "three sensitivity curves",
+            ),
+        ],
+    )
+
+
+def _tables(ledger: Ledger) -> list[Section]:
+    frame = ledger.frame()
+    columns = ["row", "column", "printed", "computed", "verdict", "note"]
+    blocks: list[Block] = []
+    for name in NAMES:
+        rows = frame[(frame["source"] == f"Table {name}") & (frame["printed"] != "")]
+        if len(rows):
+            counts = rows["verdict"].value_counts()
+            told = ", ".join(f"{counts[v]} {v}" for v in counts.index)
+            blocks.append(
+                DataTable(rows[columns], f"{table(name).source}: {told}.", _formats(), collapse=True)
+            )
+    other = frame[~frame["source"].str.startswith("Table") & (frame["printed"] != "")]
+    words = DataTable(other[["source", *columns]], "Numbers of text, equations and figures.", _formats())
+    return [
+        Section("Tables, printed beside computed", blocks),
+        Section("The text's numbers", [words]),
+    ]
+
+
+def _unprinted(ledger: Ledger) -> Section:
+    frame = ledger.frame()
+    rows = frame[frame["printed"] == ""][["source", "row", "column", "computed", "note"]].copy()
+    rows["note"] = rows["note"].str.replace("nothing printed to compare with; ", "", regex=False)
+    caption = "Decoded curves, joint fits, checks: values that the thesis draws or implies but does not "
+    "print."
+    return Section("Recomputed values", [DataTable(rows, caption, _formats(), collapse=True)])
+
+
+def _figures(chapter: Chapter3, bands: dict[str, MuscleBands]) -> Section:
+    limits = {m: orders.range_from_print(m, r) for m, r in (("MPAM1", 0.8838), ("MPAM2", 0.8879))}
+    note = "The measured curves of these figures are lost and are not imitated."
+    return Section(
+        "Figures of chapter 4",
+        [
+            Figure(muscles.blocked(bands), f"Blocked force. {note}", "lines and points over pressure"),
+            Figure(muscles.free_contraction(bands), f"Free contraction. {note}", "points over pressure"),
+            Figure(
+                muscles.order_selection("MPAM1", limits["MPAM1"], 5),
+                "Order of MPAM1, relative least squares.",
+                "curves",
+            ),
+            Figure(
+                muscles.order_selection("MPAM2", limits["MPAM2"], 6),
+                "Order of MPAM2, relative least squares.",
+                "curves",
+            ),
+            Figure(muscles.average_curves(), f"Decoded average curves. {note}", "force against contraction"),
+            Figure(
+                muscles.modulus_laws(),
+                "Moduli (points) with the printed laws (dashed).",
+                "moduli over pressure",
+            ),
+            Figure(
+                muscles.strand_search(),
+                "Search for f_s against the loop with Table 4.10's friction; shaded: the range that the "
+                "thesis searched. The relative "
+                "error's minimum depends on how near to free contraction the loop is used.",
+                "error against f_s",
+            ),
+            Figure(muscles.loops(), f"Loops by theory. {note}", "loops"),
+        ],
+        note="" if bands else "No posterior was given, so that no bands are drawn.",
+    )
+
+
+def _comparison(bands: dict[str, MuscleBands]) -> Section:
+    frame = table_4_12(bands, COMPARED_AT)
+    return Section("Table 4.12 with bands", [DataTable(frame, "Printed beside the posterior's 90 % bands.")])
+
+
+def _formats() -> dict[str, str]:
+    return {"computed": "{:.6g}"}
