@@ -12,8 +12,8 @@ from mpam_calib.cli.app import app
 
 @app.command()
 def reproduce(
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for reproduction.csv and report.html.")],
-    seed: Annotated[int, typer.Option(help="Seed of the stochastic searches.")] = 0,
+    out: Annotated[Path, typer.Option("-o", "--output", help="folder for reproduction.csv and report.html")],
+    seed: Annotated[int, typer.Option(help="seed of the stochastic searches", min=0)] = 0,
 ) -> None:
     """Recompute every table and number of the thesis and name its misprints."""
     from rich.console import Console

@@ -195,8 +195,8 @@ def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float
     else:
         result = _minimize(
             lambda v: float(f(v)),
-            # Interior point starts inside.
-            np.clip(v0, 0.02, 0.98),
+            # Interior point starts inside, and with a step and a barrier that keep it near its start.
+            np.clip(v0, 0.01, 0.99),
             jac=lambda v: gradient(f, v),
             hess="2-point",
             method="trust-constr",
@@ -204,7 +204,15 @@ def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float
             constraints=[
                 NonlinearConstraint(g, 0.0, np.inf, jac=slope, hess="2-point") for g, slope in constraints
             ],
-            options={"gtol": 1e-300, "xtol": 1e-300, "barrier_tol": BARRIER / 10.0, "maxiter": 500},
+            options={
+                "gtol": 1e-300,
+                "xtol": 1e-300,
+                "barrier_tol": BARRIER / 10.0,
+                "maxiter": 500,
+                "initial_tr_radius": 0.05,
+                "initial_barrier_parameter": 1e-3,
+                "initial_barrier_tolerance": 1e-3,
+            },
             callback=ip_step,
         )
     x = problem.unscaled(full(np.clip(np.asarray(result.x), 0.0, 1.0)))

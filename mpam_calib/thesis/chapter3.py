@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mpam_calib.design.blocked import blocked_force, braid_loss, gaylord_force
 from mpam_calib.design.optimality import Optimality, optimality
 from mpam_calib.design.problem import E_BR, case_one, case_two
-from mpam_calib.design.search import Optimum, evolve, hybrid
+from mpam_calib.design.search import Optimum, hybrid
 from mpam_calib.design.sensitivity import around, of_ratio_bound
 from mpam_calib.thesis.tables import table
 from mpam_calib.units import DEG, KPA, MM
@@ -24,7 +24,8 @@ R, ALPHA = np.asarray(3.0 * MM), np.asarray(72.0 * DEG)
 PRESSURES = np.array([float(p) for p in table("3.5").rows]) * KPA
 MONOFILAMENTS = (0.10 * MM, 0.11 * MM, 0.13 * MM)
 """Radii of the PET monofilaments that such sleeves are braided from, m."""
-STARTS = 100
+STARTS, SHORT = 100, 20
+"""Random starts, and generations after which their evolutionary stage is cut short."""
 
 
 def force(P_kPa: float, t_mm: float, R_mm: float = 3.0, alpha_deg: float = 72.0) -> float:
@@ -39,6 +40,11 @@ def force(P_kPa: float, t_mm: float, R_mm: float = 3.0, alpha_deg: float = 72.0)
 def loss(P_kPa: float, R_br_mm: float, n: float) -> float:
     """Braid term of Eq. 3.12 at R = 3 mm, α = 72°, N."""
     return float(braid_loss(np.asarray(P_kPa * KPA), R, ALPHA, np.asarray(R_br_mm * MM), np.asarray(n), E_BR))
+
+
+def strands_that_fit(R_br_mm: float = 2.5) -> float:
+    """Strands of one direction that fit round R = 3 mm at α = 72°."""
+    return float(np.floor(np.pi * R / MM * np.sin(ALPHA) / R_br_mm))
 
 
 def best_wall(ratio: float = 0.4) -> float:
@@ -127,7 +133,7 @@ class Chapter3:
     def starts(self) -> Starts:
         """A hundred hybrid searches of Case II from random populations, their global stage cut short."""
         exact = best_force(200.0)
-        runs = [hybrid(case_two(200 * KPA), self.seed + i, generations=6) for i in range(1, STARTS + 1)]
+        runs = [hybrid(case_two(200 * KPA), self.seed + i, generations=SHORT) for i in range(1, STARTS + 1)]
         reached = [[abs(stage.value - exact) < 1e-5 for stage in run.stages] for run in runs]
         globals_ = [run.start.value for run in runs]
         counts = [run.evaluations for run in runs]
@@ -140,11 +146,6 @@ class Chapter3:
             min(globals_),
             max(globals_),
         )
-
-    @cached_property
-    def short_global(self) -> list[float]:
-        """Objective (N) of ten short evolutionary runs, as in Tables 3.3 and 3.4."""
-        return [evolve(case_two(200 * KPA), self.seed + i, 6).value for i in range(10)]
 
 
 def three_models(P: Array) -> pd.DataFrame:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpam_calib.thesis import decoded, laws, orders
+from mpam_calib.thesis import decoded, friction, laws, orders
 from mpam_calib.thesis.ledger import MISPRINT, Ledger
 from mpam_calib.thesis.tables import table
 
@@ -32,7 +32,7 @@ def _of_number(ledger: Ledger) -> list[Erratum]:
             f"{r.source}, {r.row}, {r.column}",
             r.printed,
             f"{r.computed:.6g}",
-            f"{r.note[:1].upper()}{r.note[1:]}.",
+            f"{r.note[:1].upper()}{r.note[1:].rstrip('.')}.",
         )
         for r in ledger.rows
         if r.verdict == MISPRINT
@@ -53,6 +53,8 @@ def _readings() -> list[Erratum]:
     root = 100.0 * decoded.first_root(2.5e5, E[4])
     law = laws.double_exponential(table("4.9").values(), laws.P_KPA)
     lost = decoded.force(decoded.LEVELS, np.asarray(0.0), law)
+    true = decoded.decoded_curves("MPAM2", np.zeros(1)).force[:, 0]
+    E2 = decoded.moduli("MPAM2")[4]
     return [
         Erratum(
             "Eq. 2.13-2.17, 4.5, 4.6, 4.10-4.12, 4.18",
@@ -72,7 +74,9 @@ def _readings() -> list[Erratum]:
             "Not used for the force; laws are fitted to the force of all levels jointly",
             f"The R² reproduce, and the law gives {', '.join(f'{f:.0f}' for f in lost)} N at γ = 0 where "
             "Table 4.7 "
-            "decodes to 20, 42, 74, 96, 118 N: the moduli are about 1e9 Pa and cancel to 1e5.",
+            f"decodes to {', '.join(f'{f:.0f}' for f in true)} N: moduli that add up to "
+            f"{np.abs(E2).sum():.1e} Pa "
+            f"in size at 250 kPa cancel to {abs(E2.sum()):.1e} Pa.",
         ),
         Erratum(
             "Tables 4.2, 4.6, 4.8, 4.11",
@@ -129,7 +133,9 @@ def _equations() -> list[Erratum]:
             "Eq. 2.40, 2.42",
             "S_contact / S_scale with S_scale a ratio of lengths",
             "Eq. 2.43 as printed, called empirical",
-            "An area has to be scaled by a ratio of areas; the friction would then be 0.12 N at 200 kPa.",
+            "An area has to be scaled by a ratio of areas; the friction would then be "
+            f"{friction.strand_friction_by_area():.2f} N at 200 kPa instead of "
+            f"{float(decoded.strand_friction(np.asarray(2e5), np.asarray(0.0))):.2f} N.",
         ),
         Erratum(
             "Eq. 2.42, middle form",

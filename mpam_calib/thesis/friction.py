@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mpam_calib.physics.friction import HERTZ
 from mpam_calib.thesis import decoded
 
 Array = NDArray[np.float64]
@@ -62,3 +63,10 @@ def matching_strand_factor(level: int) -> float:
     zero = np.asarray(0.0)
     F = decoded.force(P, zero, decoded.moduli("MPAM1")[level])
     return float(decoded.coulomb_factors()[level] * F / decoded.strand_friction(P, zero, 1.0))
+
+
+def strand_friction_by_area() -> float:
+    """Strand friction (N) at γ = 0, 200 kPa, if Eq. 2.40's S_scale were a ratio of areas, not of lengths."""
+    P = float(decoded.LEVELS[3])
+    lengths = HERTZ * np.cbrt(decoded.E_BR / (P * (1.0 - decoded.NU_S**2)))
+    return float(decoded.strand_friction(np.asarray(P), np.asarray(0.0)) / lengths)

@@ -18,7 +18,7 @@ from mpam_calib.report.page import (
 )
 from mpam_calib.thesis import errata as printed_errors
 from mpam_calib.thesis import orders
-from mpam_calib.thesis.chapter3 import MONOFILAMENTS, Chapter3, best_force, loss
+from mpam_calib.thesis.chapter3 import MONOFILAMENTS, SHORT, Chapter3, best_force, loss, strands_that_fit
 from mpam_calib.thesis.figures import muscles, optimisation
 from mpam_calib.thesis.ledger import MISPRINT, NOT_REPRODUCIBLE, REPRODUCED, Ledger
 from mpam_calib.thesis.posterior import MuscleBands, table_4_12
@@ -53,10 +53,9 @@ def _lead(ledger: Ledger) -> list[Block]:
     n = ledger.counts()
     return [
         Headline(
-            f"Of {n[REPRODUCED] + n[MISPRINT] + n[NOT_REPRODUCIBLE]} printed numbers {n[REPRODUCED]} are "
-            "reproduced, "
-            f"{n[MISPRINT]} contradict the thesis's own equations or tables, and {n[NOT_REPRODUCIBLE]} need "
-            "measurements that are lost."
+            f"Of {n[REPRODUCED] + n[MISPRINT] + n[NOT_REPRODUCIBLE]} printed numbers {n[REPRODUCED]} are reproduced, "
+            f"{n[MISPRINT]} contradict the thesis's own equations or tables, and {n[NOT_REPRODUCIBLE]} cannot be "
+            "recomputed, nearly all because the measurements are lost."
         ),
         Numbers(
             [
@@ -98,6 +97,7 @@ def _optimiser(chapter: Chapter3) -> Section:
         columns=["case", "active bound or constraint", "multiplier", "unit"],
     )
     starts = chapter.starts
+    best, free = best_force(200), chapter.case_one.best
     packed, thin = chapter.packed.best, chapter.packed_monofilament.best
     losses = ", ".join(f"{loss(200, r * 1e3, 50):.1f} N at {r * 1e3:.2f} mm" for r in MONOFILAMENTS)
     return Section(
@@ -105,35 +105,37 @@ def _optimiser(chapter: Chapter3) -> Section:
         [
             Text(
                 f"{starts.runs} searches of Case II from random populations, their evolutionary stage cut "
-                "short at 6 "
-                f"generations ({starts.lowest_global:.1f} to {starts.highest_global:.1f} N, as scattered "
-                "as Table 3.3): SQP then "
-                f"reached {best_force(200):.5f} N to 1e-5 N in {starts.reached_sqp} of them, interior "
-                f"point in {starts.reached_ip}, "
-                f"with {starts.evaluations_mean:.0f} evaluations on average for all three stages, those "
-                "for gradients included."
+                "short "
+                f"at {SHORT} generations ({starts.lowest_global:.1f} to {starts.highest_global:.1f} N, as "
+                f"scattered as Table 3.3): SQP then reached {best_force(200):.5f} N to 1e-5 N in "
+                f"{starts.reached_sqp} of them, interior point in {starts.reached_ip}, with "
+                f"{starts.evaluations_mean:.0f} evaluations on average for all three stages, those for "
+                "gradients included."
             ),
             DataTable(
                 active,
-                f"What holds the optimum at 200 kPa, and what it would gain if relaxed. Largest part of "
-                "the gradient that they do "
-                f"not balance: {max(one.residual, two.residual):.1e}.",
+                "What holds the optimum at 200 kPa, and what it would gain if relaxed. Non-negative multipliers "
+                f"leave {max(one.residual, two.residual):.1%} of the gradient unbalanced.",
             ),
             Text(
-                f"Case I ends at n = {chapter.case_one.best.x[4]:.0f} strands of R_br = "
-                f"{chapter.case_one.best.x[3] * 1e3:.1f} mm, of which at most 3 "
-                f"in each direction fit round the muscle. With strands that must fit, the braid takes "
-                f"{best_force(200) - packed.value:.3f} N instead of "
-                f"{best_force(200) - chapter.case_one.best.value:.5f} N "
-                f"(n = {packed.x[4]:.0f}, R_br = {packed.x[3] * 1e3:.2f} mm); with strands no thicker "
-                "than a real monofilament "
-                f"{best_force(200) - thin.value:.2f} N (n = {thin.x[4]:.0f}, R_br = {thin.x[3] * 1e3:.2f} "
-                f"mm), and with 50 of them {losses}. That the "
-                "braid's term is negligible follows from strands that no braid has."
+                f"Case I ends at n = {free.x[4]:.0f} strands of R_br = {free.x[3] * 1e3:.1f} mm, of which "
+                f"{strands_that_fit():.0f} in each direction fit round the muscle. With strands that must "
+                f"fit, the braid takes {best - packed.value:.3f} N instead of {best - free.value:.5f} N "
+                f"(n = {packed.x[4]:.0f}, R_br = {packed.x[3] * 1e3:.2f} mm); with strands no thicker than a "
+                f"real monofilament {best - thin.value:.2f} N (n = {thin.x[4]:.0f}, R_br = "
+                f"{thin.x[3] * 1e3:.2f} mm), and with 50 of them {losses}. That the braid's term is "
+                "negligible follows from strands that no braid has."
             ),
-            Figure(optimisation.histories(chapter), "Objective by iteration.", "convergence curves"),
-            Figure(optimisation.three_force_models(), "Three force models.", "lines over pressure"),
-            Figure(optimisation.by_pressure(chapter), "Optimum by pressure.", "line with printed points"),
+            Figure(
+                optimisation.histories(chapter),
+                "Approach by iteration. Interior point passes through designs outside the constraints.",
+                "convergence curves",
+            ),
+            Figure(
+                optimisation.over_pressure(chapter),
+                "Three force models, and the optimum by pressure.",
+                "lines over pressure with printed points",
+            ),
             Figure(
                 optimisation.sensitivity(chapter),
                 "Post-optimality: R and α one at a time, the wall through the bound of V_bl/V, each ± 5 %.",
@@ -178,18 +180,8 @@ def _figures(chapter: Chapter3, bands: dict[str, MuscleBands]) -> Section:
     return Section(
         "Figures of chapter 4",
         [
-            Figure(muscles.blocked(bands), f"Blocked force. {note}", "lines and points over pressure"),
-            Figure(muscles.free_contraction(bands), f"Free contraction. {note}", "points over pressure"),
-            Figure(
-                muscles.order_selection("MPAM1", limits["MPAM1"], 5),
-                "Order of MPAM1, relative least squares.",
-                "curves",
-            ),
-            Figure(
-                muscles.order_selection("MPAM2", limits["MPAM2"], 6),
-                "Order of MPAM2, relative least squares.",
-                "curves",
-            ),
+            Figure(muscles.outputs(bands), f"Blocked force and free contraction. {note}", "three panels"),
+            Figure(muscles.order_selection(limits), "Orders, by relative least squares.", "curves"),
             Figure(muscles.average_curves(), f"Decoded average curves. {note}", "force against contraction"),
             Figure(
                 muscles.modulus_laws(),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from mpam_calib.physics.friction import HERTZ
 from mpam_calib.thesis import decoded, friction, laws
 from mpam_calib.thesis.ledger import FROM_MEASUREMENT, Ledger
 from mpam_calib.thesis.statistics import squared_correlation
@@ -92,13 +91,11 @@ def _strand_factor(ledger: Ledger) -> None:
         ("Coulomb friction at γ = 0 (N)", float(decoded.coulomb_factors()[3]) * F0),
     ):
         ledger.unprinted("Eq. 4.14, 4.17", "200 kPa", name, value, "f_s = 0.15; K_f of Table 4.10")
-    # Eq. 2.40 divides an area by S_scale, which Eq. 2.42 makes a ratio of lengths.
-    lengths = HERTZ * np.cbrt(decoded.E_BR / (float(P) * (1.0 - decoded.NU_S**2)))
     ledger.unprinted(
         "Eq. 2.40, 2.42",
         "200 kPa",
         "strand friction at γ = 0 if S_scale were a ratio of areas (N)",
-        float(decoded.strand_friction(P, np.asarray(0.0))) / lengths,
+        friction.strand_friction_by_area(),
         "Eq. 2.40 divides an area by the ratio of lengths of Eq. 2.42; Eq. 2.43 is kept as printed, as "
         "empirical",
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from mpam_calib.design.problem import E_BR
 from mpam_calib.thesis import decoded, laws
-from mpam_calib.thesis.chapter3 import Chapter3, best_force, force, loss
+from mpam_calib.thesis.chapter3 import SHORT, Chapter3, best_force, force, loss, strands_that_fit
 from mpam_calib.thesis.ledger import Ledger
 from mpam_calib.thesis.tables import table
 from mpam_calib.units import GPA
@@ -152,7 +152,7 @@ def _optimisation(ledger: Ledger, chapter: Chapter3) -> None:
         "Table 3.2",
         "R_br = 2.5 mm",
         "strands of one direction that fit round R = 3 mm",
-        float(np.floor(np.pi * 3.0 * np.sin(np.radians(72.0)) / 2.5)),
+        strands_that_fit(),
         "the optimum has 50",
     )
     for t in (chapter.case_two.best.x[1] * 1e3, 0.7):
@@ -172,7 +172,7 @@ def _optimisation(ledger: Ledger, chapter: Chapter3) -> None:
             reached,
             f"{starts.evaluations_mean:.0f} evaluations on average in all, {starts.evaluations_max} at "
             "most; the global stage alone, cut "
-            f"short at 6 generations, stopped between {starts.lowest_global:.1f} and "
+            f"short at {SHORT} generations, stopped between {starts.lowest_global:.1f} and "
             f"{starts.highest_global:.1f} N",
         )
 

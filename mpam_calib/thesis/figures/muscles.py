@@ -20,63 +20,60 @@ if TYPE_CHECKING:
 COLOURS = {"MPAM1": style.BLUE, "MPAM2": style.VERMILLION}
 
 
-def blocked(bands: dict[str, MuscleBands]) -> Figure:
-    """Fig. 4.7 and 4.9: Eq. 3.16 with t = 0.7 mm, the three models, and the decoded values."""
+def outputs(bands: dict[str, MuscleBands]) -> Figure:
+    """Fig. 4.7, 4.9, 4.10: blocked force, three models of it, free contraction, against pressure."""
     P = np.linspace(0.0, 300.0, 61)
     with style.applied():
-        figure = style.new_figure(2.9)
-        left, right = figure.subplots(1, 2)
+        figure = style.new_figure(3.0)
+        left, middle, right = figure.subplots(1, 3)
         left.plot(P, [force(p, 0.7) for p in P], color=style.INK, label="Eq. 3.16, t = 0.7 mm")
         for muscle, colour in COLOURS.items():
             F0 = decoded.decoded_curves(muscle, np.zeros(1)).force[:, 0]
             left.plot(laws.P_KPA, F0, "o", color=colour, markersize=4, label=f"{muscle}, decoded")
             _band(left, bands.get(muscle), "blocked_force_N", colour, 1.0)
+            _free(right, muscle, colour)
+            _band(right, bands.get(muscle), "free_contraction", colour, 100.0)
         left.set_title("Fig. 4.7: blocked force")
         frame = three_models(P * 1e3)
         for column, line in (("G", "-"), ("G+t", "-"), ("G+t+b", "--")):
-            right.plot(frame["P_kPa"], frame[column], line, label=column)
-        right.set_title("Fig. 4.9: three models")
-        for ax in (left, right):
+            middle.plot(frame["P_kPa"], frame[column], line, label=column)
+        middle.set_title("Fig. 4.9: three models")
+        right.set_title("Fig. 4.10: free contraction")
+        for ax in (left, middle):
             _label(ax, "pressure (kPa)", "blocked force (N)")
+        _label(right, "pressure (kPa)", "free contraction (%)")
     return figure
 
 
-def free_contraction(bands: dict[str, MuscleBands]) -> Figure:
-    """Fig. 4.10: free contraction against pressure, decoded; printed values of Table 4.12."""
-    printed = table("4.12")
-    with style.applied():
-        figure = style.new_figure(2.8, 5.0)
-        ax = figure.subplots()
-        for muscle, colour in COLOURS.items():
-            moduli = decoded.moduli(muscle)
-            roots = [
-                100 * decoded.first_root(float(P), E) for P, E in zip(decoded.LEVELS, moduli, strict=True)
-            ]
-            ax.plot(laws.P_KPA, roots, "o-", color=colour, markersize=4, label=f"{muscle}, decoded")
-            value = printed.value(f"Present work (MPAM_{muscle[-1]})", "Free Contraction (%)")
-            ax.plot(250.0, value, "x", color=colour, markersize=8, label=f"{muscle}, Table 4.12")
-            _band(ax, bands.get(muscle), "free_contraction", colour, 100.0)
-        ax.set_title("Fig. 4.10: free contraction")
-        _label(ax, "pressure (kPa)", "free contraction (%)")
-    return figure
+def _free(ax: Axes, muscle: str, colour: str) -> None:
+    """Decoded free contractions of a muscle, and Table 4.12's value."""
+    pairs = zip(decoded.LEVELS, decoded.moduli(muscle), strict=True)
+    roots = [100.0 * decoded.first_root(float(P), E) for P, E in pairs]
+    ax.plot(laws.P_KPA, roots, "o-", color=colour, markersize=4, label=f"{muscle}, decoded")
+    value = table("4.12").value(f"Present work (MPAM_{muscle[-1]})", "Free Contraction (%)")
+    ax.plot(250.0, value, "x", color=colour, markersize=8, label=f"{muscle}, Table 4.12")
 
 
-def order_selection(muscle: str, limit: float, highest: int) -> Figure:
-    """Fig. 4.13 or 4.17: force models of rising order at 200 kPa against the decoded average."""
-    gamma, F = orders.curve(muscle, limit)
+def order_selection(limits: dict[str, float]) -> Figure:
+    """Fig. 4.13 and 4.17: force models of rising order at 200 kPa against the decoded averages.
+
+    ``limits`` are the contractions up to which each muscle is fitted.
+    """
     P = decoded.LEVELS[orders.LEVEL]
-    G = decoded.gas_and_thickness(P, gamma)
     with style.applied():
-        figure = style.new_figure(2.9, 5.0)
-        ax = figure.subplots()
-        ax.plot(gamma, F, color=style.INK, linewidth=2.5, alpha=0.35, label="decoded average")
-        ax.plot(gamma, G, color=style.GREY, label="F_{G+t}")
-        for order in range(1, highest + 1):
-            X = decoded.columns(gamma, order)
-            fitted = G + X @ least_squares(X, F - G, 1.0 / F)
-            ax.plot(gamma, fitted, "--", linewidth=1.0, label=f"M = {order}")
-        ax.set_title(f"Fig. {'4.13' if muscle == 'MPAM1' else '4.17'}: order of {muscle}, 200 kPa")
-        _label(ax, "contraction γ", "force (N)")
+        figure = style.new_figure(3.0)
+        numbers = (("MPAM1", "4.13", 5), ("MPAM2", "4.17", 6))
+        for ax, (muscle, name, highest) in zip(figure.subplots(1, 2), numbers, strict=True):
+            gamma, F = orders.curve(muscle, limits[muscle])
+            G = decoded.gas_and_thickness(P, gamma)
+            ax.plot(gamma, F, color=style.INK, linewidth=3.0, alpha=0.35, label="decoded average")
+            ax.plot(gamma, G, color=style.GREY, label="gas and thickness")
+            for order in range(1, highest + 1):
+                X = decoded.columns(gamma, order)
+                fitted = G + X @ least_squares(X, F - G, 1.0 / F)
+                ax.plot(gamma, fitted, "--", linewidth=1.0, label=f"M = {order}")
+            ax.set_title(f"Fig. {name}: order of {muscle}, 200 kPa")
+            _label(ax, "contraction γ", "force (N)")
     return figure
 
 
@@ -96,7 +93,7 @@ def average_curves() -> Figure:
 
 def modulus_laws() -> Figure:
     """Fig. 4.15 and 4.19: moduli against pressure with the printed laws."""
-    P = np.linspace(40.0, 260.0, 200)
+    P = np.linspace(50.0, 260.0, 200)
     a, b = table("4.4").values()
     exponential = laws.double_exponential(table("4.9").values(), P)
     with style.applied():

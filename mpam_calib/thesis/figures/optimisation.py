@@ -8,6 +8,7 @@ import numpy as np
 
 from mpam_calib.report.figures import style
 from mpam_calib.thesis.chapter3 import Chapter3, three_models
+from mpam_calib.thesis.tables import table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def histories(chapter: Chapter3) -> Figure:
-    """Fig. 3.1, 3.3, 3.4: objective against iteration, interior point and SQP, both cases."""
+    """Fig. 3.1, 3.3, 3.4: how the local and the evolutionary searches approach the optimum, both cases."""
     with style.applied():
         figure = style.new_figure(2.8)
         left, right = figure.subplots(1, 2)
@@ -25,47 +26,38 @@ def histories(chapter: Chapter3) -> Figure:
         ):
             for stage, line in zip(run.stages, ("-", "--"), strict=True):
                 steps = np.arange(1, len(stage.history) + 1)
-                left.plot(steps, stage.history, line, color=colour, label=f"{name}, GA+{stage.method}")
+                distance = np.abs(np.array(stage.history) - run.best.value)
+                left.semilogy(steps, distance, line, color=colour, label=f"{name}, GA+{stage.method}")
             steps = np.arange(1, len(run.start.history) + 1)
             right.plot(steps, run.start.history, color=colour, label=name)
+        left.set_ylim(bottom=1e-8)
         left.set_title("Local search (Fig. 3.1, 3.3, 3.4)")
         right.set_title("Evolutionary search before it")
-        for ax in (left, right):
-            _label(ax, "iteration", "blocked force (N)")
+        _label(left, "iteration", "distance from the optimum (N)")
+        _label(right, "iteration", "blocked force (N)")
     return figure
 
 
-def three_force_models() -> Figure:
-    """Fig. 3.2: three force models against pressure."""
+def over_pressure(chapter: Chapter3) -> Figure:
+    """Fig. 3.2 and 3.5: three force models, and the optimum with the printed values, against pressure."""
     frame = three_models(np.linspace(0.0, 600e3, 61))
+    names = ("Gaylord", "with thickness", "with thickness and braid")
+    looks = ((style.VERMILLION, "-"), (style.BLUE, "-"), (style.GREEN, "--"))
+    printed, found = table("3.5"), chapter.by_pressure
     with style.applied():
-        figure = style.new_figure(2.8, 5.0)
-        ax = figure.subplots()
-        names = ("Gaylord", "with thickness", "with thickness and braid")
-        looks = ((style.VERMILLION, "-"), (style.BLUE, "-"), (style.GREEN, "--"))
+        figure = style.new_figure(2.9)
+        left, right = figure.subplots(1, 2)
         for column, name, (colour, line) in zip(("G", "G+t", "G+t+b"), names, looks, strict=True):
-            ax.plot(frame["P_kPa"], frame[column], line, color=colour, label=name)
-        ax.set_title("Fig. 3.2: three models of the optimum")
-        _label(ax, "pressure (kPa)", "blocked force (N)")
-    return figure
-
-
-def by_pressure(chapter: Chapter3) -> Figure:
-    """Fig. 3.5: the optimum against pressure, with the printed values."""
-    from mpam_calib.thesis.tables import table
-
-    printed = table("3.5")
-    found = chapter.by_pressure
-    with style.applied():
-        figure = style.new_figure(2.8, 5.0)
-        ax = figure.subplots()
-        ax.plot(found["P_kPa"], found["case_two_N"], color=style.BLUE, label="Case II, recomputed")
+            left.plot(frame["P_kPa"], frame[column], line, color=colour, label=name)
+        left.set_title("Fig. 3.2: three models of the optimum")
+        right.plot(found["P_kPa"], found["case_two_N"], color=style.BLUE, label="Case II, recomputed")
         x = [float(row) for row in printed.rows]
         for case, mark in (("I", "x"), ("II", "+")):
             y = [printed.value(row, f"Cost function (Case {case})") for row in printed.rows]
-            ax.plot(x, y, mark, color=style.INK, label=f"Case {case}, printed")
-        ax.set_title("Fig. 3.5: optimum by pressure")
-        _label(ax, "pressure (kPa)", "blocked force (N)")
+            right.plot(x, y, mark, color=style.INK, label=f"Case {case}, printed")
+        right.set_title("Fig. 3.5: optimum by pressure")
+        for ax in (left, right):
+            _label(ax, "pressure (kPa)", "blocked force (N)")
     return figure
 
 
