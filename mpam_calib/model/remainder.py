@@ -20,7 +20,7 @@ from mpam_calib.model.state import Setting
 
 Array = NDArray[np.float64]
 
-HALF_WAVES, PRESSURE_DEGREE, KEPT = 8, 3, 40
+HALF_WAVES, PRESSURE_DEGREE, KEPT = 8, 6, 40
 MARGIN = 1.25
 """The half-waves span this multiple of the geometric contraction, so that the edge is not special."""
 SMOOTH, ROUGH = "remainder_sd_N", "stroke_remainder_sd_N"
@@ -29,7 +29,7 @@ SMOOTH, ROUGH = "remainder_sd_N", "stroke_remainder_sd_N"
 def remainder_parameters(setting: Setting, strokes: bool) -> tuple[Parameter, ...]:
     """Amplitudes (N): a priori half a percent of the force scale, and less for a single stroke."""
     scale = setting.force_scale
-    found = [Parameter(SMOOTH, LogNormal(0.005 * scale, 1.0), "size of what the physics leaves")]
+    found = [Parameter(SMOOTH, LogNormal(0.01 * scale, 1.0), "size of what the physics leaves")]
     if strokes:
         found.append(Parameter(ROUGH, LogNormal(0.002 * scale, 1.0), "the same, for one stroke alone"))
     return tuple(found)

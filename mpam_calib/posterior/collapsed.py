@@ -3,11 +3,13 @@
 y = f(θ) + A(θ) η + ε, η ~ N(0, I), ε ~ N(0, C(θ)), so with S = I + Aᵀ C⁻¹ A and h = Aᵀ C⁻¹ (y − f)
     ln p(y | θ) = −½ [(y − f)ᵀ C⁻¹ (y − f) − hᵀ S⁻¹ h + ln|C| + ln|S| + n ln 2π],
     η | θ, y ~ N(S⁻¹ h, S⁻¹).
-Censored points enter through ln Φ and a Gaussian (Laplace) approximation in η.
+Slack rows enter through the probability of being slack and a Laplace approximation in η
+(:func:`_with_slack`).
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -30,6 +32,8 @@ Values = Mapping[str, Array]
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 NEWTON_STEPS = 6
+WRONG_FLAG = 0.01
+"""Share of slack flags that may be wrong: one of them must not outweigh all other readings."""
 
 
 class Piece(NamedTuple):
@@ -246,10 +250,10 @@ def _cholesky(matrix: Array) -> Array:
     try:
         return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
     except np.linalg.LinAlgError:
-        good = np.all(np.isfinite(matrix), axis=(-2, -1))
-        good[good] = np.linalg.eigvalsh(matrix[good])[..., 0] > 0.0
         factor = np.full_like(matrix, np.nan)
-        factor[good] = np.linalg.cholesky(matrix[good])
+        for index in np.ndindex(matrix.shape[:-2]):
+            with contextlib.suppress(np.linalg.LinAlgError):
+                factor[index] = np.linalg.cholesky(matrix[index])
         return factor
 
 
@@ -285,31 +289,56 @@ def _gaussian(constant: Array, pull: Array, mean: Array, factor: Array) -> Array
 
 
 def _with_slack(gram: Array, pull: Array, constant: Array, parts: list[Slack]) -> tuple[Array, Array, Array]:
-    """Newton's method in η on the log-concave posterior with ln Φ((floor − f − Aη)/sd) terms."""
-    fixed = np.concatenate([part.fixed for part in parts], axis=1)
-    columns = np.concatenate([part.columns for part in parts], axis=1)
-    sd = np.concatenate([part.sd for part in parts], axis=1)
-    floor = np.concatenate([part.floor for part in parts], axis=1)
-    eta = _solve(gram, pull)
+    """Laplace's approximation in η with slack rows: the better of two climbs.
 
-    def state(eta: Array) -> tuple[Array, Array, Array]:
-        z = (floor - fixed - np.einsum("bnk,bk->bn", columns, eta)) / sd
-        log_cdf = special.log_ndtr(z)
-        # φ/Φ by the scaled error function: both underflow far from the floor.
-        ratio = np.sqrt(2.0 / np.pi) / special.erfcx(-z / np.sqrt(2.0))
-        weight = np.clip(ratio * (z + ratio), 0.0, 1.0) / sd**2
-        return log_cdf.sum(axis=1), ratio, weight
+    A slack row says ln((1 − ε) Φ((floor − f − Aη)/sd) + ε). One climb starts from all other rows' fit,
+    where a wrong flag is left aside at once; the other takes all flags at their word first.
+    """
+    whole = Slack(*(np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True)))
+    start = _solve(gram, pull)
+    trusting = _climb(gram, pull, whole, start, 0.0)
+    ends = [_climb(gram, pull, whole, first, WRONG_FLAG) for first in (start, trusting)]
+    found = [_laplace(gram, pull, constant, whole, eta) for eta in ends]
+    value, mean, factor = found[0]
+    better = found[1][0] > value
+    return (
+        np.where(better, found[1][0], value),
+        np.where(better[:, None], found[1][1], mean),
+        np.where(better[:, None, None], found[1][2], factor),
+    )
 
+
+def _slack_terms(slack: Slack, eta: Array, wrong: float) -> tuple[Array, Array, Array]:
+    """Sum of the rows' log probabilities (B,), their slopes and (clipped) curvatures in force (B, n)."""
+    z = (slack.floor - slack.fixed - np.einsum("bnk,bk->bn", slack.columns, eta)) / slack.sd
+    log_cdf = special.log_ndtr(z) + np.log1p(-wrong)
+    # φ/Φ by the scaled error function: both underflow far from the floor.
+    ratio = np.sqrt(2.0 / np.pi) / special.erfcx(-z / np.sqrt(2.0))
+    log_term = np.logaddexp(log_cdf, np.log(wrong)) if wrong else log_cdf
+    share = np.exp(log_cdf - log_term)
+    curvature = share * ratio * (z + ratio) - share * (1.0 - share) * ratio**2
+    return log_term.sum(axis=1), share * ratio / slack.sd, np.clip(curvature, 0.0, 1.0) / slack.sd**2
+
+
+def _climb(gram: Array, pull: Array, slack: Slack, eta: Array, wrong: float) -> Array:
     for _ in range(NEWTON_STEPS):
-        _, ratio, weight = state(eta)
-        gradient = pull - np.einsum("bkl,bl->bk", gram, eta)
-        gradient -= np.einsum("bnk,bn->bk", columns, ratio / sd)
-        hessian = gram + np.swapaxes(columns, 1, 2) @ (columns * weight[..., None])
-        eta = eta + _solve(hessian, gradient)
-    log_cdf, _, weight = state(eta)
-    hessian = gram + np.swapaxes(columns, 1, 2) @ (columns * weight[..., None])
-    factor = _cholesky(hessian)
+        _, slope, curvature = _slack_terms(slack, eta, wrong)
+        gradient = pull - np.einsum("bkl,bl->bk", gram, eta) - np.einsum("bnk,bn->bk", slack.columns, slope)
+        eta = eta + _solve(_slack_hessian(gram, slack, curvature), gradient)
+    return eta
+
+
+def _slack_hessian(gram: Array, slack: Slack, curvature: Array) -> Array:
+    result: Array = gram + np.swapaxes(slack.columns, 1, 2) @ (slack.columns * curvature[..., None])
+    return result
+
+
+def _laplace(
+    gram: Array, pull: Array, constant: Array, slack: Slack, eta: Array
+) -> tuple[Array, Array, Array]:
+    log_term, _, curvature = _slack_terms(slack, eta, WRONG_FLAG)
+    factor = _cholesky(_slack_hessian(gram, slack, curvature))
     log_det = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)
     quadratic = np.einsum("bk,bkl,bl->b", eta, gram, eta) - 2.0 * np.einsum("bk,bk->b", pull, eta)
-    value: Array = log_cdf - 0.5 * (constant + quadratic + log_det)
+    value: Array = log_term - 0.5 * (constant + quadratic + log_det)
     return value, eta, factor

@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from mpam_calib.model.noise import WHITE
+from mpam_calib.model.remainder import SMOOTH
+from mpam_calib.model.tensile import MISFIT, NOISE
 from mpam_calib.posterior.collapsed import Collapsed
 
 Array = NDArray[np.float64]
@@ -78,12 +81,22 @@ def curvature(target: Collapsed, u: Array, top: float) -> Array:
     return covariance
 
 
+def _structured(target: Collapsed, u: Array) -> Array:
+    """A start that takes the misfit for structure (little noise, a large remainder), not for noise."""
+    other = u.copy()
+    for name, shift in ((WHITE, -1.5), (NOISE, -1.5), (SMOOTH, 2.0), (MISFIT, 2.0)):
+        if name in target.model.names:
+            other[target.model.names.index(name)] = shift
+    return other
+
+
 def find_modes(target: Collapsed, rng: np.random.Generator, start: Array | None = None) -> list[Mode]:
     """Distinct modes, best first: from the priors' centre (or a start) and the best of some prior draws."""
     d = len(target.model.names)
     draws = rng.standard_normal((32, d))
     best = draws[np.argsort(-evaluate(target, draws))[:2]]
-    starts = [np.zeros(d) if start is None else start, *best]
+    centre = np.zeros(d) if start is None else start
+    starts = [centre, _structured(target, centre), *best]
     found: list[Mode] = []
     for point in starts:
         u, top = climb(target, point)
