@@ -11,6 +11,7 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -159,7 +160,7 @@ def _files(m: HyperelasticMuscle, levels: list[float], noise: float, seed: int) 
 
 
 def write_calibration_case(seed: int, folder: Path, held_out: Path, kinds: tuple[str, ...] = ("loops",),
-                           strain: str = "engineering", order: int = 3) -> dict[str, object]:
+                           strain: str = "engineering", order: int = 3) -> dict[str, Any]:
     """Write a specimen of `kinds` of files, and one with the held-out pressure levels; return the truth.
 
     Fitted levels are every other share of the highest, held-out ones those between: all inside the fitted
@@ -168,7 +169,7 @@ def write_calibration_case(seed: int, folder: Path, held_out: Path, kinds: tuple
     m = hyperelastic_muscle(seed)
     levels = [round(m.top_kPa * share, 1) for share in LEVEL_SHARES]
     noise = 0.003 * float(m.force(np.array(m.top_kPa), np.array(0.0)))
-    truth: dict[str, object] = {"wall": m.wall, "C1_MPa": m.C1, "C2_MPa": m.C2, "noise_N": noise,
+    truth: dict[str, Any] = {"wall": m.wall, "C1_MPa": m.C1, "C2_MPa": m.C2, "noise_N": noise,
                                 "top_kPa": m.top_kPa, "levels": {}}
     parts = ((Path(folder), levels[0::2], 0), (Path(held_out), levels[1::2], 1))
     for place, chosen, part in parts:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -87,7 +88,7 @@ def signatures(case: Case, rows: Rows) -> list[tuple[float, float]]:
     return out
 
 
-def truth_of(recording: Recording) -> dict[str, object]:
+def truth_of(recording: Recording) -> dict[str, Any]:
     """What is hidden, as plain values."""
     case, p, sim = recording.case, recording.case.protocol, recording.case.muscle.simulation
     hidden = []
@@ -147,7 +148,7 @@ def loops_csv(recording: Recording) -> str:
     return "\n".join(out) + "\n"
 
 
-def write_case(case: Case, folder: Path, truth: Path | None = None) -> dict[str, object]:
+def write_case(case: Case, folder: Path, truth: Path | None = None) -> dict[str, Any]:
     """Write specimen.toml and loops.csv into `folder`; return the truth, and write it to `truth` if given.
 
     `truth` must lie outside the folder: whoever reads the specimen must not find the answer beside it.

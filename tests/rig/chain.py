@@ -105,7 +105,7 @@ def _static(state: State, offset_deg: float) -> tuple[Array, Array]:
     m, sim = state.muscle, state.muscle.simulation
     g = m.geometry
     angle = g.alpha0_deg + offset_deg + state.angle_drift
-    g = Geometry(g.L0_mm, g.R0_mm, g.t0_mm, angle)  # type: ignore[arg-type]
+    g = Geometry(g.L0_mm, g.R0_mm, g.t0_mm, angle)
     pressure, length = state.pressure, g.L0_mm - state.shortening
     stretch: Array | float = 1.0 if state.stretch is None else state.stretch(g, length, pressure)
     build = state.shape or (lambda geo, L, k: shape_of(geo, L, sim.kinematics, k))

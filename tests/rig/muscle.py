@@ -7,6 +7,7 @@ with T = tan^2(alpha), sin(alpha) = L/B and s(e) = sum_k E_k(P) e^k.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +19,15 @@ PA = 1e-6  # Pa -> N/mm2
 
 @dataclass(frozen=True)
 class Geometry:
-    """Outer radius R0, wall t0, active length L0 [mm]; braid angle alpha0 from the hoop direction [deg]."""
+    """Outer radius R0, wall t0, active length L0 [mm]; braid angle alpha0 from the hoop direction [deg].
+
+    The angle may be an array with one value per row where an effect makes it vary over the test.
+    """
 
     L0_mm: float
     R0_mm: float
     t0_mm: float
-    alpha0_deg: float
+    alpha0_deg: float | Array
 
 
 @dataclass(frozen=True)
@@ -101,9 +105,9 @@ class Muscle:
     braid: Braid | None
     simulation: Simulation
 
-    def with_simulation(self, **changes: object) -> Muscle:
+    def with_simulation(self, **changes: Any) -> Muscle:
         """The same muscle with some fields of the simulation changed."""
-        return replace(self, simulation=replace(self.simulation, **changes))  # type: ignore[arg-type]
+        return replace(self, simulation=replace(self.simulation, **changes))
 
 
 @dataclass(frozen=True)
@@ -173,7 +177,7 @@ def wall_force(s: Shape, axial: Array, hoop: Array) -> Array:
     return np.pi * (2.0 * s.R * s.t - s.t**2) * axial - 2.0 * np.pi * s.R * s.t * s.T * hoop
 
 
-def static_force(m: Muscle, pressure_kPa: Array, contraction: Array) -> Array:
+def static_force(m: Muscle, pressure_kPa: Array | float, contraction: Array | float) -> Array:
     """Friction-free force [N] of the declared simulation at pressure [kPa] and contraction gamma."""
     p, gamma = np.broadcast_arrays(np.asarray(pressure_kPa, float), np.asarray(contraction, float))
     p, gamma = p.ravel(), gamma.ravel()
@@ -192,7 +196,7 @@ def strand_friction(g: Geometry, b: Braid, pressure_kPa: Array, contraction: Arr
     a0 = np.radians(g.alpha0_deg)
     P = np.maximum(pressure_kPa, 0.0) * KPA
     ratio = P * (1.0 - b.nu_s**2) / (b.E_br_GPa * 1e3)
-    surface = 2.0 * np.pi * g.R0_mm * g.L0_mm
+    surface: Array | float = 2.0 * np.pi * g.R0_mm * g.L0_mm
     if not flat:
         root = np.sqrt(np.maximum(1.0 - (np.sin(a0) * (1.0 - contraction)) ** 2, 1e-9))
         surface = surface * np.cos(a0) / root / (1.0 - contraction)

@@ -6,6 +6,7 @@ of the wall's force over the rows, one unit of each being `noise` N rms: cancell
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -87,13 +88,14 @@ def nuisance_of(muscle: Muscle, rows: Rows, noise_N: float) -> Nuisance:
     return Nuisance(muscle, basis, np.array(sd), np.array(step))
 
 
-def differences(nuisance: Nuisance, at: Array, force: Array, model: object) -> Array:
+def differences(nuisance: Nuisance, at: Array, force: Array,
+                model: Callable[[Muscle], Array]) -> Array:
     """Forward differences (rows, count) of `model(muscle)` in the free numbers."""
     out = np.empty((force.size, nuisance.count))
     for j in range(nuisance.count):
         moved = at.copy()
         moved[j] += nuisance.step[j]
-        out[:, j] = (model(nuisance.apply(moved)) - force) / nuisance.step[j]  # type: ignore[operator]
+        out[:, j] = (model(nuisance.apply(moved)) - force) / nuisance.step[j]
     return out
 
 

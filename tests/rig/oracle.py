@@ -158,10 +158,11 @@ class Oracle:
             scaled = jacobian * sd
             normal = scaled.T @ scaled + np.eye(sd.size)
             residual = self.target - self.white(base[self.keep])
-            move = self._step(normal, scaled.T @ residual - at / sd, at / sd, moving) * sd
             gain = 0.0
-            for damping in (1.0, 0.5, 0.2, 0.05, 0.01):
-                new = at + damping * move
+            # Full step first, then shorter ones bent to the gradient (Levenberg-Marquardt).
+            for ridge in (0.0, 0.03, 0.3, 3.0, 30.0, 300.0):
+                bent = normal + ridge * np.diag(np.diag(normal))
+                new = at + self._step(bent, scaled.T @ residual - at / sd, at / sd, moving) * sd
                 trial = {i: self._allowed(i, v) for i, v in zip(moving, new[free.size:], strict=True)} | fixed
                 force = self.force(trial, new[:free.size])
                 score = self._objective(force, trial, new[:free.size], moving)
@@ -223,7 +224,7 @@ class Oracle:
             out |= {tuple(ids[j] for j in members): float(v) for members, v in zip(sets, value, strict=True)}
         return out
 
-    def judge(self, refits: int = 16) -> Verdict:
+    def judge(self, refits: int = 10) -> Verdict:
         """Refit the truth and its strongest rivals exactly."""
         case = self.recording.case
         truth = case.ids
@@ -239,9 +240,10 @@ class Oracle:
                 chosen += sorted((k for k in lacking if len(k) == size), key=lambda k: -table[k])[:refits]
             for ids in chosen:
                 ids = tuple(sorted(ids))
-                if ids not in fits:
-                    near = true if table is tables[-1] and truth else null
-                    fits[ids] = self.fit(ids, near.sizes, near.free)
+                if ids not in fits:  # from both ends: a curved effect can hold a fit in a side valley
+                    starts = [true, null] if truth and not set(truth) <= set(ids) else [true]
+                    found = [self.fit(ids, near.sizes, near.free) for near in starts]
+                    fits[ids] = max(found, key=lambda f: f.log_evidence)
         lead = {k: true.log_evidence - f.log_evidence for k, f in fits.items() if k != truth}
         lacking_lead = {k: v for k, v in lead.items() if not set(truth) <= set(k)}
         adding_lead = [v for k, v in lead.items() if set(truth) < set(k)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -105,8 +106,8 @@ def _constant(value: float) -> Callable[[Muscle, Rows], float]:
 
 
 def _form(effect: str, name: str, parameter: str, apply: Callable[[State, float], None],
-          unit: Callable[[Muscle, Rows], float], **more: object) -> Form:
-    return Form(effect, name, parameter, "friction", apply, unit, **more)  # type: ignore[arg-type]
+          unit: Callable[[Muscle, Rows], float], **more: Any) -> Form:
+    return Form(effect, name, parameter, "friction", apply, unit, **more)
 
 
 def _strand_unit(m: Muscle, rows: Rows) -> float:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from ..chain import Form, State
@@ -45,7 +48,7 @@ def _dead_band_unit(m: Muscle, rows: Rows) -> float:
 
 # --- pressure droop: percent at full stroke ----------------------------------------------------------------
 
-def _droop(shape: str) -> object:
+def _droop(shape: str) -> Callable[[State, float], None]:
     def apply(state: State, size: float) -> None:
         u = state.rows.fraction
         bent = {"linear": u, "quadratic": u**2, "cosine": 0.5 * (1.0 - np.cos(np.pi * u)),
@@ -113,8 +116,9 @@ def _two_percent(m: Muscle, rows: Rows) -> float:
     return 2.0
 
 
-def _form(effect: str, name: str, parameter: str, apply: object, unit: object, **more: object) -> Form:
-    return Form(effect, name, parameter, "rig", apply, unit, **more)  # type: ignore[arg-type]
+def _form(effect: str, name: str, parameter: str, apply: Callable[[State, float], None],
+          unit: Callable[[Muscle, Rows], float], **more: Any) -> Form:
+    return Form(effect, name, parameter, "rig", apply, unit, **more)
 
 
 FORMS: tuple[Form, ...] = (

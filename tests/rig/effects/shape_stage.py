@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -146,8 +147,8 @@ def _constant(value: float) -> Callable[[Muscle, Rows], float]:
 
 
 def _form(effect: str, name: str, parameter: str, apply: Callable[[State, float], None], unit: float,
-          stage: str = "shape", **more: object) -> Form:
-    return Form(effect, name, parameter, stage, apply, _constant(unit), **more)  # type: ignore[arg-type]
+          stage: str = "shape", **more: Any) -> Form:
+    return Form(effect, name, parameter, stage, apply, _constant(unit), **more)
 
 
 FORMS: tuple[Form, ...] = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -100,8 +101,8 @@ def _half(m: Muscle, rows: Rows) -> float:
 
 
 def _form(effect: str, name: str, parameter: str, apply: Callable[[State, float], None],
-          unit: Callable[[Muscle, Rows], float], **more: object) -> Form:
-    return Form(effect, name, parameter, "statics", apply, unit, **more)  # type: ignore[arg-type]
+          unit: Callable[[Muscle, Rows], float], **more: Any) -> Form:
+    return Form(effect, name, parameter, "statics", apply, unit, **more)
 
 
 FORMS: tuple[Form, ...] = (
