@@ -192,10 +192,11 @@ class Collapsed:
                 )
             )
             lost = lost | bins.slack[layout.index]
-            covariance = _forget(covariance, lost)
+            covariance = _forget(covariance[:, layout.kind], lost)
         stacked = np.concatenate([design, residual[..., None]], axis=-1)
         padded = np.where(lost[None, :, :, None], 0.0, stacked[:, layout.index])
-        piece = _segment_piece(covariance, padded, int((~lost).sum()))
+        kind = np.arange(len(lost)) if bins.slack.any() else layout.kind
+        piece = _segment_piece(covariance, kind, padded, int((~lost).sum()))
         if bins.scatter is not None:
             fast = fast_noise_log_likelihood(bins.scatter, bins.averaged, white, correlated, time)
             piece = piece._replace(constant=piece.constant - 2.0 * fast)
@@ -265,12 +266,13 @@ def _white_piece(design: Array, residual: Array, variance: Array) -> Piece:
     return Piece(gram, pull, constant)
 
 
-def _segment_piece(covariance: Array, padded: Array, rows: int) -> Piece:
-    """The share of correlated segments: covariance (B, S, m, m), [A r] padded (B, S, m, k + 1)."""
+def _segment_piece(covariance: Array, kind: NDArray[np.int64], padded: Array, rows: int) -> Piece:
+    """The share of correlated segments: covariance (B, K, m, m) by kind (S,), [A r] padded (B, S, m, k + 1)."""
     B, S, m, width = padded.shape
     factor = _cholesky(covariance)
-    log_det = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=2, axis2=3)), axis=(1, 2))
-    weighted = (np.linalg.inv(covariance) @ padded).reshape(B, S * m, width)
+    log_dets = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=2, axis2=3)), axis=2)
+    log_det = log_dets @ np.bincount(kind, minlength=covariance.shape[1])
+    weighted = (np.linalg.inv(covariance)[:, kind] @ padded).reshape(B, S * m, width)
     full = np.swapaxes(padded.reshape(B, S * m, width), 1, 2) @ weighted
     return Piece(full[:, :-1, :-1], full[:, :-1, -1], full[:, -1, -1] + log_det + rows * LOG_2PI)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,55 +14,63 @@ Array = NDArray[np.float64]
 
 ROUGH_LENGTH = 1.0 / 6.0
 """Correlation length of a stroke's own remainder, as a share of the stroke."""
+ALIKE = 0.02
+"""Strokes whose bins agree to this share (rows, lags, kernel) have one covariance."""
 
 
 @dataclass(frozen=True)
 class StrokeCovariance:
-    """Padded (segments S, width m) layout of the bins and what their covariance is made of.
+    """Where the bins stand in a padded (segments S, width m) layout, and what their covariance is made of.
 
-    ``white`` (S, m) is 1/rows; ``rough`` (S, m, m) the exponential kernel in displacement; ``rows``
-    (S, m) the numbers of rows; ``lag`` (S, m, m) rows between the end of one bin and the start of a
-    later one; ``pad`` (S, m) marks the padding.
+    ``index`` (S, m) is the bin at each place and ``pad`` (S, m) marks places without one. Strokes that
+    are alike share a covariance, that of the first of their kind: ``kind`` (S,) numbers the kinds K.
+    ``rows`` (K, m) are the rows of each bin, ``rough`` (K, m, m) the exponential kernel in displacement,
+    ``lag`` (K, m, m) the rows from the end of one bin to the start of a later one, ``dt`` (K,) the time
+    between rows (s), ``averaged`` how many raw rows each row stands for.
     """
 
-    white: Array
-    rough: Array
+    index: NDArray[np.int64]
+    pad: NDArray[np.bool_]
+    kind: NDArray[np.int64]
     rows: Array
+    rough: Array
     lag: Array
     dt: Array
-    pad: NDArray[np.bool_]
-    index: NDArray[np.int64]
+    averaged: int
 
     @staticmethod
     def build(bins: LoopBins) -> StrokeCovariance:
         """The layout of a set of bins."""
-        shape = (bins.segments, bins.width)
-        index = np.full(shape, -1)
+        index = np.full((bins.segments, bins.width), -1)
         index[bins.segment, bins.position] = np.arange(len(bins))
         pad = index < 0
         x = bins.middle().displacement[index]
         rows = np.where(pad, 1.0, bins.count[index])
-        distance = np.abs(x[:, :, None] - x[:, None, :]) / bins.contraction_scale
-        rough = np.exp(-distance / ROUGH_LENGTH)
-        start, stop = bins.start[index], bins.stop[index]
-        gap = (start[:, None, :] - stop[:, :, None]) / bins.dt[:, None, None]
-        lag = np.maximum(np.triu(np.where(np.isfinite(gap), gap, 0.0), 1), 0.0)
         both = pad[:, :, None] | pad[:, None, :]
-        rough[both] = 0.0
+        distance = np.abs(x[:, :, None] - x[:, None, :]) / bins.contraction_scale
+        rough = np.where(both, 0.0, np.exp(-distance / ROUGH_LENGTH))
+        gap = (bins.start[index][:, None, :] - bins.stop[index][:, :, None]) / bins.dt[:, None, None]
+        lag = np.where(both, 0.0, np.maximum(np.triu(gap, 1), 0.0))
+        first, kind = _kinds(pad, rows, rough, lag, bins.dt)
         return StrokeCovariance(
-            np.where(pad, 0.0, 1.0 / rows) / bins.averaged, rough, rows, lag, bins.dt, pad, index
+            index, pad, kind, rows[first], rough[first], lag[first], bins.dt[first], bins.averaged
         )
 
+    @cached_property
+    def kind_pad(self) -> NDArray[np.bool_]:
+        """Padding of each kind (K, m)."""
+        return self.pad[[int(np.argmax(self.kind == k)) for k in range(len(self.rows))]]
+
     def matrix(self, white: Array, correlated: Array, time: Array, rough: Array) -> Array:
-        """Covariance (B, S, m, m), N², for sds and time constant of shape (B,); padding has variance 1.
+        """Covariance (B, K, m, m), N², for sds and a time constant of shape (B,); padding has variance 1.
 
         The correlated part is AR(1) between rows: cov of two bin means is
         σ² ρ^lag (1 − ρ^n)(1 − ρ^n′) / (n n′ (1 − ρ)²).
         """
-        B = len(white)
-        S, m = self.pad.shape
+        pad = self.kind_pad
+        m = pad.shape[1]
         result = rough[:, None, None, None] ** 2 * self.rough
-        diagonal = white[:, None, None] ** 2 * self.white
+        diagonal = white[:, None, None] ** 2 / (self.rows * self.averaged)
         if np.any(correlated > 0.0):
             log_rho = -self.dt / time[:, None]
             rho = np.exp(log_rho)[:, :, None]
@@ -69,16 +78,37 @@ class StrokeCovariance:
             series = -np.expm1(n * log_rho[:, :, None]) / (1.0 - rho)
             mean = series / n
             cross = np.exp(self.lag * log_rho[:, :, None, None]) * mean[:, :, :, None] * mean[:, :, None, :]
-            cross = np.triu(cross, 1)
+            upper = np.triu(np.ones((m, m)), 1) * ~(pad[:, :, None] | pad[:, None, :])
+            cross *= upper
             own = (n * (1.0 + rho) / (1.0 - rho) - 2.0 * rho * series / (1.0 - rho)) / n**2
-            variance = correlated[:, None, None, None] ** 2
-            both = self.pad[:, :, None] | self.pad[:, None, :]
-            result = result + np.where(both, 0.0, variance * (cross + np.swapaxes(cross, 2, 3)))
-            diagonal = diagonal + np.where(self.pad, 0.0, variance[..., 0] * own)
-        diagonal = np.where(self.pad, 1.0, diagonal)
-        result = np.broadcast_to(result, (B, S, m, m)).copy()
-        result[:, :, np.arange(m), np.arange(m)] += diagonal
-        return result
+            variance = correlated[:, None, None] ** 2
+            result = result + variance[..., None] * (cross + np.swapaxes(cross, 2, 3))
+            diagonal = diagonal + variance * own
+        result[:, :, np.arange(m), np.arange(m)] += np.where(pad, 1.0, diagonal)
+        return np.asarray(result)
+
+
+def _kinds(
+    pad: NDArray[np.bool_], rows: Array, rough: Array, lag: Array, dt: Array
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First stroke of each kind (K,), and the kind of each stroke (S,)."""
+    first: list[int] = []
+    kind = np.empty(len(pad), dtype=np.int64)
+    for s in range(len(pad)):
+        for number, f in enumerate(first):
+            if (
+                np.array_equal(pad[s], pad[f])
+                and abs(dt[s] / dt[f] - 1.0) <= ALIKE
+                and np.all(np.abs(rows[s] - rows[f]) <= np.maximum(ALIKE * rows[f], 1.0))
+                and np.all(np.abs(lag[s] - lag[f]) <= ALIKE * lag[f] + 2.0)
+                and np.max(np.abs(rough[s] - rough[f])) <= ALIKE
+            ):
+                kind[s] = number
+                break
+        else:
+            kind[s] = len(first)
+            first.append(s)
+    return np.array(first), kind
 
 
 def fast_noise_log_likelihood(

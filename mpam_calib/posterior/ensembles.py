@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import ctypes
-import multiprocessing
-import os
-import signal
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing.pool import Pool
 from typing import Any
 
 import numpy as np
 from emcee import EnsembleSampler, State
 from emcee.moves import DEMove, DESnookerMove, StretchMove
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.mode import evaluate
+from mpam_calib.posterior.pool import held_target
 from mpam_calib.posterior.proposal import IndependenceMove, StudentMixture
 
 Array = NDArray[np.float64]
@@ -45,14 +37,10 @@ class Block:
     state: EnsembleState
 
 
-_TARGET: Collapsed | None = None
-
-
 def advance(task: tuple[EnsembleState, StudentMixture, int]) -> Block:
     """Run one ensemble for a number of steps (in a worker)."""
     state, mixture, steps = task
-    target = _TARGET
-    assert target is not None
+    target = held_target()
     walkers, d = state.coords.shape
     moves = [
         (IndependenceMove(mixture), 0.6),
@@ -60,10 +48,9 @@ def advance(task: tuple[EnsembleState, StudentMixture, int]) -> Block:
         (DESnookerMove(), 0.05),
         (StretchMove(), 0.1),
     ]
-    with threadpool_limits(1):
-        sampler = EnsembleSampler(walkers, d, lambda u: evaluate(target, u), moves=moves, vectorize=True)
-        start = State(state.coords, log_prob=state.log_prob, random_state=state.random)
-        final = sampler.run_mcmc(start, steps, skip_initial_state_check=True)
+    sampler = EnsembleSampler(walkers, d, lambda u: evaluate(target, u), moves=moves, vectorize=True)
+    start = State(state.coords, log_prob=state.log_prob, random_state=state.random)
+    final = sampler.run_mcmc(start, steps, skip_initial_state_check=True)
     return Block(
         sampler.get_chain(),
         sampler.get_log_prob(),
@@ -86,21 +73,3 @@ def start_states(
             log_prob[bad] = evaluate(target, coords[bad])
         states.append(EnsembleState(coords, log_prob, rng.get_state()))
     return states
-
-
-def _adopt(target: Collapsed) -> None:
-    """Prepare a worker: it ignores Ctrl-C (its parent decides) and dies with its parent."""
-    global _TARGET
-    _TARGET = target
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(1, signal.SIGKILL)
-
-
-@contextmanager
-def workers(target: Collapsed, wanted: int) -> Iterator[Pool]:
-    """A pool whose workers hold the target."""
-    method = "fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn"
-    count = max(1, min(wanted, os.cpu_count() or 1))
-    with multiprocessing.get_context(method).Pool(count, initializer=_adopt, initargs=(target,)) as pool:
-        yield pool

@@ -12,12 +12,15 @@ from mpam_calib.model.noise import WHITE
 from mpam_calib.model.remainder import SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
 from mpam_calib.posterior.collapsed import Collapsed
+from mpam_calib.posterior.pool import held_target, workers
 
 Array = NDArray[np.float64]
 
 GRADIENT_STEP = 2e-5
-BATCH = 64
+BATCH = 16
 """Parameter vectors evaluated at once: bounds the memory."""
+HOPELESS = 15.0
+"""Nats below the best at which a climb has got stuck rather than found a mode."""
 LOOSEST = 0.2
 """Smallest precision that is believed; the prior's own is 1."""
 
@@ -81,6 +84,10 @@ def curvature(target: Collapsed, u: Array, top: float) -> Array:
     return covariance
 
 
+def _climb_held(start: Array) -> tuple[Array, float]:
+    return climb(held_target(), start)
+
+
 def _structured(target: Collapsed, u: Array) -> Array:
     """A start that takes the misfit for structure (little noise, a large remainder), not for noise."""
     other = u.copy()
@@ -97,13 +104,14 @@ def find_modes(target: Collapsed, rng: np.random.Generator, start: Array | None 
     best = draws[np.argsort(-evaluate(target, draws))[:2]]
     centre = np.zeros(d) if start is None else start
     starts = [centre, _structured(target, centre), *best]
+    with workers(target, len(starts)) as pool:
+        ends = pool.map(_climb_held, starts, chunksize=1)
     found: list[Mode] = []
-    for point in starts:
-        u, top = climb(target, point)
+    for u, top in sorted(ends, key=lambda end: -end[1]):
+        if found and found[0].log_posterior - top > HOPELESS:
+            continue
         covariance = curvature(target, u, top)
         precision = np.linalg.inv(covariance)
         if all((u - m.u) @ precision @ (u - m.u) > 4.0 * d for m in found):
             found.append(Mode(u, top, covariance))
-    found.sort(key=lambda m: -m.log_posterior)
-    # Far below the best, a mode is a place where the climb got stuck.
-    return [mode for mode in found if mode.log_evidence > found[0].log_evidence - 15.0]
+    return found

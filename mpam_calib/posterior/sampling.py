@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from mpam_calib.posterior.checkpoint import Checkpoint
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.convergence import ESS_WANTED, Diagnostics, diagnose_chains
-from mpam_calib.posterior.ensembles import Block, EnsembleState, advance, start_states, workers
+from mpam_calib.posterior.ensembles import Block, EnsembleState, advance, start_states
 from mpam_calib.posterior.mode import Mode
+from mpam_calib.posterior.pool import workers
 from mpam_calib.posterior.proposal import StudentMixture
 from mpam_calib.posterior.warmup import WarmUp, laplace_mixture, warm_up
 
@@ -57,7 +58,7 @@ class Sampling:
 
 def walkers_for(dimensions: int) -> int:
     """Walkers of one ensemble: even, and several times the dimension."""
-    return max(32, 4 * dimensions + dimensions % 2)
+    return max(32, 4 * dimensions)
 
 
 def sample(

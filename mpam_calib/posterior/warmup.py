@@ -19,7 +19,7 @@ from mpam_calib.posterior.proposal import StudentMixture
 
 Array = NDArray[np.float64]
 
-ROUNDS, STEPS = 6, 25
+ROUNDS, STEPS = 6, 20
 ENOUGH = 0.3
 """Accepted share at which the proposal is good enough."""
 INFLATION = 1.15
@@ -78,8 +78,8 @@ def warm_up(
         blocks = run(states, mixture, STEPS)
         states = [block.state for block in blocks]
         accepted.append(float(np.mean([block.accepted for block in blocks])))
-        # The first rounds still carry the wide starts; after them a good proposal is left alone.
-        if number >= 2 and accepted[-1] >= ENOUGH:
+        # The first round still carries the wide starts; after it a good proposal is left alone.
+        if number >= 1 and accepted[-1] >= ENOUGH:
             break
         modes = _climb_again(target, blocks, modes)
         mixture = _refit(blocks, modes)

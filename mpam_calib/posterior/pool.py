@@ -1,0 +1,44 @@
+"""Worker processes that hold one target: sent once, used for climbs and for ensembles."""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing.pool import Pool
+
+from threadpoolctl import threadpool_limits
+
+from mpam_calib.posterior.collapsed import Collapsed
+
+_TARGET: Collapsed | None = None
+
+
+def held_target() -> Collapsed:
+    """The target of this worker."""
+    assert _TARGET is not None
+    return _TARGET
+
+
+def _adopt(target: Collapsed) -> None:
+    """Prepare a worker: it ignores Ctrl-C (its parent decides) and dies with its parent."""
+    global _TARGET
+    _TARGET = target
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # One thread each: the work is parallel already, and sums must not depend on the machine.
+    threadpool_limits(1)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)
+
+
+@contextmanager
+def workers(target: Collapsed, wanted: int) -> Iterator[Pool]:
+    """A pool of at most ``wanted`` workers that hold the target."""
+    method = "fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn"
+    count = max(1, min(wanted, os.cpu_count() or 1))
+    with multiprocessing.get_context(method).Pool(count, initializer=_adopt, initargs=(target,)) as pool:
+        yield pool
