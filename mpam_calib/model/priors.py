@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
+from scipy import special, stats
 
 Array = NDArray[np.float64]
 
@@ -61,39 +61,42 @@ class Normal:
 
 
 @dataclass(frozen=True)
-class BelowNormal:
-    """N(mean, scale²) given that the value is below ``high``."""
+class NormalWithin:
+    """N(mean, scale²) given that the value lies between ``low`` and ``high`` (either may be infinite)."""
 
     mean: float
     scale: float
+    low: float
     high: float
 
     @property
-    def _share(self) -> float:
-        return float(special.ndtr((self.high - self.mean) / self.scale))
+    def _shares(self) -> tuple[float, float]:
+        ends = (np.array([self.low, self.high]) - self.mean) / self.scale
+        below, above = special.ndtr(ends)
+        return float(below), float(above - below)
 
     def from_normal(self, u: Array) -> Array:
-        """The value at the share Φ(u) of what lies below ``high``."""
-        share = np.maximum(special.ndtr(np.clip(u, -37.0, _FAR)) * self._share, 1e-300)
-        return self.mean + self.scale * special.ndtri(share)
+        """The value at the share Φ(u) of what lies between the bounds."""
+        below, width = self._shares
+        share = below + width * special.ndtr(np.clip(u, -37.0, _FAR))
+        return self.mean + self.scale * special.ndtri(np.clip(share, 1e-300, 1.0 - 1e-16))
 
     def to_normal(self, x: Array) -> Array:
         """Inverse of :meth:`from_normal`."""
-        share = special.ndtr((np.asarray(x) - self.mean) / self.scale) / self._share
-        return special.ndtri(np.minimum(share, 1.0 - 1e-15))
+        below, width = self._shares
+        share = (special.ndtr((np.asarray(x) - self.mean) / self.scale) - below) / width
+        return special.ndtri(np.clip(share, 1e-300, 1.0 - 1e-15))
 
     @property
     def sd(self) -> float:
         """Standard deviation."""
-        b = (self.high - self.mean) / self.scale
-        ratio = float(np.exp(-0.5 * b**2) / np.sqrt(2.0 * np.pi)) / self._share
-        return float(self.scale * np.sqrt(1.0 - b * ratio - ratio**2))
+        ends = (np.array([self.low, self.high]) - self.mean) / self.scale
+        return float(stats.truncnorm.std(*ends, scale=self.scale))
 
     def describe(self, factor: float = 1.0) -> str:
         """One phrase."""
-        return (
-            f"normal({self.mean / factor:.4g}, sd {self.scale / factor:.4g}) below {self.high / factor:.4g}"
-        )
+        bounds = f"between {self.low / factor:.4g} and {self.high / factor:.4g}"
+        return f"normal({self.mean / factor:.4g}, sd {self.scale / factor:.4g}) {bounds}"
 
 
 @dataclass(frozen=True)
