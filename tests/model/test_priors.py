@@ -1,0 +1,86 @@
+"""Priors are what they say: normalised densities, each the image of a standard normal."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import integrate, special, stats
+
+from mpam_calib.model.model import build_model
+from mpam_calib.model.priors import BelowNormal, HalfNormal, LogNormal, LogUniform, Normal, Uniform
+
+from .build import blueprint
+
+CASES = {
+    "normal": (Normal(3.0, 2.0), stats.norm(3.0, 2.0)),
+    "below": (BelowNormal(1.0, 2.0, 2.5), stats.truncnorm(-np.inf, 0.75, 1.0, 2.0)),
+    "far below": (BelowNormal(0.0, 1.0, -2.0), stats.truncnorm(-np.inf, -2.0, 0.0, 1.0)),
+    "no bound": (BelowNormal(0.0, 1.5, np.inf), stats.norm(0.0, 1.5)),
+    "log-normal": (LogNormal(0.2, 0.7), stats.lognorm(0.7, scale=0.2)),
+    "half-normal": (HalfNormal(0.2), stats.halfnorm(scale=0.2)),
+    "uniform": (Uniform(-1.0, 4.0), stats.uniform(-1.0, 5.0)),
+    "log-uniform": (LogUniform(0.01, 3.0), stats.loguniform(0.01, 3.0)),
+}
+cases = pytest.mark.parametrize(("prior", "named"), CASES.values(), ids=list(CASES))
+
+
+@cases
+def test_draws_follow_the_named_distribution(prior, named):
+    u = np.random.default_rng(1).standard_normal(200_000)
+    assert stats.kstest(prior.from_normal(u), named.cdf).pvalue > 1e-3
+
+
+@cases
+def test_the_image_has_the_named_probability_everywhere(prior, named):
+    u = np.linspace(-5.0, 5.0, 101)
+    x = prior.from_normal(u)
+    assert np.all(np.diff(x) > 0.0)
+    assert named.cdf(x) == pytest.approx(special.ndtr(u), rel=1e-7, abs=1e-14)
+    assert named.sf(x) == pytest.approx(special.ndtr(-u), rel=1e-7, abs=1e-14)
+
+
+@cases
+def test_the_density_integrates_to_one(prior, named):
+    """φ(u)·du/dx by differences of the prior's own inverse, integrated over its range."""
+    x = prior.from_normal(np.linspace(-6.0, 6.0, 20_001))
+    u = prior.to_normal(x)
+    density = np.exp(-0.5 * u**2) / np.sqrt(2.0 * np.pi) * np.gradient(u, x)
+    assert integrate.trapezoid(density, x) == pytest.approx(1.0, abs=1e-4)
+    inner = slice(2000, 18_001)
+    assert density[inner] == pytest.approx(named.pdf(x[inner]), rel=1e-3)
+
+
+@cases
+def test_the_inverse(prior, named):
+    u = np.linspace(-6.0, 6.0, 61)
+    assert prior.to_normal(prior.from_normal(u)) == pytest.approx(u, abs=1e-6)
+
+
+@cases
+def test_the_standard_deviation(prior, named):
+    assert prior.sd == pytest.approx(named.std(), rel=1e-6)
+
+
+@cases
+def test_far_tails_stay_finite(prior, named):
+    x = prior.from_normal(np.array([-36.0, -9.0, 9.0, 36.0]))
+    assert np.all(np.isfinite(x))
+    assert np.all(np.diff(x) >= 0.0)
+
+
+def test_every_parameter_of_a_full_model_goes_there_and_back():
+    everything = {
+        "friction": "strand",
+        "friction_by_pressure": True,
+        "law": "exponential_each",
+        "order": 3,
+        "effects": (
+            "dead_band", "tip_shape", "braid_angle", "braid_stretch", "wall_pressure", "length_offset",
+            "coulomb_friction", "rate_friction", "presliding", "stress_softening", "creep", "force_drift",
+            "pressure_droop", "rig_compliance",
+        ),
+    }  # fmt: skip
+    model = build_model(blueprint(everything))
+    assert len(set(model.names)) == len(model.names)
+    u = np.random.default_rng(0).standard_normal((50, len(model.names)))
+    assert model.coordinates(model.values(u)) == pytest.approx(u, abs=1e-7)
