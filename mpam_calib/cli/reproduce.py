@@ -14,17 +14,22 @@ from mpam_calib.cli.app import app
 def reproduce(
     out: Annotated[Path, typer.Option("-o", "--output", help="folder for reproduction.csv and report.html")],
     seed: Annotated[int, typer.Option(help="seed of the stochastic searches", min=0)] = 0,
+    mpam1: Annotated[Path | None, typer.Option(help="RUN folder whose bands are shown for MPAM1")] = None,
+    mpam2: Annotated[Path | None, typer.Option(help="RUN folder whose bands are shown for MPAM2")] = None,
 ) -> None:
     """Recompute every table and number of the thesis and name its misprints."""
     from rich.console import Console
 
     from mpam_calib.thesis.page import page
+    from mpam_calib.thesis.posterior import MuscleBands
     from mpam_calib.thesis.reproduction import reproduce as recompute
 
+    runs = {"MPAM1": mpam1, "MPAM2": mpam2}
+    bands = {name: MuscleBands.read(name, run) for name, run in runs.items() if run is not None}
     result = recompute(seed)
     out.mkdir(parents=True, exist_ok=True)
     result.ledger.write(out / "reproduction.csv")
-    page(result).write(out / "report.html")
+    page(result, bands).write(out / "report.html")
     console = Console()
     console.print(result.ledger.summary(), soft_wrap=True)
     console.print(f"see {out / 'report.html'}", soft_wrap=True)

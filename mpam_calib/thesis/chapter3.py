@@ -74,8 +74,9 @@ class Starts:
 class Chapter3:
     """The searches of chapter 3 at 200 kPa (and at every pressure of Table 3.5), computed on demand."""
 
-    def __init__(self, seed: int = 0) -> None:
+    def __init__(self, seed: int = 0, starts: int = STARTS) -> None:
         self.seed = seed
+        self.n_starts = starts
 
     @cached_property
     def case_two(self) -> Optimum:
@@ -133,12 +134,14 @@ class Chapter3:
     def starts(self) -> Starts:
         """A hundred hybrid searches of Case II from random populations, their global stage cut short."""
         exact = best_force(200.0)
-        runs = [hybrid(case_two(200 * KPA), self.seed + i, generations=SHORT) for i in range(1, STARTS + 1)]
+        runs = [
+            hybrid(case_two(200 * KPA), self.seed + i, generations=SHORT) for i in range(1, self.n_starts + 1)
+        ]
         reached = [[abs(stage.value - exact) < 1e-5 for stage in run.stages] for run in runs]
         globals_ = [run.start.value for run in runs]
         counts = [run.evaluations for run in runs]
         return Starts(
-            STARTS,
+            self.n_starts,
             sum(r[0] for r in reached),
             sum(r[1] for r in reached),
             float(np.mean(counts)),

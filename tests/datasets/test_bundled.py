@@ -121,3 +121,25 @@ def test_the_cylinder_takes_the_higher_force_on_loading() -> None:
         assert data.cycle.max() == 10
         force = data.groupby("branch").force_N.mean()
         assert force["loading"] > force["unloading"] + 10
+
+
+@pytest.mark.parametrize(("bad", "expected"), [(3, 0), (2, 1), (1, 1), (130, 130)])
+def test_one_bad_data_set_does_not_stop_the_rest(
+    bad: int, expected: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    module = script("calibrate_all")
+    folders = module.data_sets()
+    asked = []
+
+    def pretend(folder: Path, options: list[str]) -> int:
+        asked.append(folder.name)
+        return bad if folder == folders[1] else 0
+
+    module.calibrate, module.REPORTS = pretend, module.HERE.parent / "reports" / "nothing-here"
+    assert module.main([]) == expected
+    if expected != 130:
+        assert asked == [folder.name for folder in folders]
+        told = capsys.readouterr().out
+        assert all(name[:8] in told for name in asked)
+        assert ("not converged" in told) == (bad == 3)
+        assert ("failed" in told) == (bad in (1, 2))
