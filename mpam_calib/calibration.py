@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
 from mpam_calib.model.model import Model
 from mpam_calib.posterior.checkpoint import Checkpoint
-from mpam_calib.posterior.collapsed import Collapsed
+from mpam_calib.posterior.collapsed import Collapsed, Guide
 from mpam_calib.posterior.convergence import ESS_WANTED
 from mpam_calib.posterior.draws import Draws, Reported, keep_draws, reported
+from mpam_calib.posterior.mode import Mode
 from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Sampling, sample
 from mpam_calib.posterior.summary import all_converged, summarise
 from mpam_calib.posterior.target import build_target, locate
@@ -96,12 +97,14 @@ def calibrate(
     whether the draws can be used.
     """
     target = build_target(specimen, draw_blueprint(specimen, options, material))
-    found = checkpoint.load("modes") if checkpoint else None
+    found: tuple[Guide, list[Mode]] | None = checkpoint.load("modes") if checkpoint else None
     if found is None:
-        found = locate(target, np.random.default_rng([seed, 0]))
+        target, modes = locate(target, np.random.default_rng([seed, 0]))
         if checkpoint:
-            checkpoint.save("modes", found)
-    target, modes = found
+            checkpoint.save("modes", (target.guide, modes))
+    else:
+        guide, modes = found
+        target = replace(target, guide=guide)
     sampling = sample(target, modes, seed, max_steps, ess_wanted, checkpoint, listener)
     draws = keep_draws(target, sampling, seed)
     return Calibration(specimen, target, sampling, draws, seed, ess_wanted)

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+from types import FrameType
+
+from mpam_calib.errors import InputError, Interrupted
 
 DONE, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 130
 """Exit codes."""
@@ -13,25 +17,73 @@ def main() -> None:
     """Run the command line; the only place where an exception becomes a line and an exit code."""
     # One BLAS thread: the parallelism is over ensembles, and sums must not depend on the machine.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(variable, "1")
+        os.environ[variable] = "1"
+    ctrl_c = CtrlC()
+    signal.signal(signal.SIGINT, ctrl_c)
+    try:
+        code = _run()
+    except (Interrupted, KeyboardInterrupt) as error:
+        code = _interrupted(error)
+    except InputError as error:
+        code = _refused(str(error))
+    except BrokenPipeError:
+        # The reader of our output went away (mpam-calib ... | head): nobody is left to tell.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = DONE
+    except OSError as error:
+        if error.filename is None:
+            raise
+        code = _refused(f"{error.filename}: found {error.strerror}, expected a place to read or write")
+    except Exception as error:
+        # Compiled code may turn Ctrl-C into an error of its own.
+        if not ctrl_c.pressed:
+            raise
+        code = _interrupted(error)
+    sys.exit(code)
+
+
+class CtrlC:
+    """Ctrl-C stops this process; workers that were just forked leave the decision to it."""
+
+    def __init__(self) -> None:
+        self.process = os.getpid()
+        self.pressed = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Handle the signal."""
+        if os.getpid() == self.process:
+            self.pressed = True
+            raise KeyboardInterrupt
+
+
+def _run() -> int:
+    """The exit code of one command; what the parser refuses is told in one line."""
     import typer
 
     from mpam_calib.cli.app import app
-    from mpam_calib.errors import InputError, Interrupted
 
+    if len(sys.argv) == 1:
+        app(["--help"], standalone_mode=False)
+        return _refused("command line: found no command, expected one of those above")
     try:
-        code = app(standalone_mode=False)
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        code = BAD_INPUT
-    except (Interrupted, KeyboardInterrupt, typer.Abort):
-        print("interrupted: the same command resumes", file=sys.stderr)
-        code = INTERRUPTED
+        return int(app(standalone_mode=False) or DONE)
+    except typer.Abort as error:
+        raise Interrupted from error
     except Exception as error:
-        # A wrong option: the command line's parser knows how to say so in one line.
+        # A wrong option: the parser knows how to say so.
         message = getattr(error, "format_message", None)
         if message is None:
             raise
-        print(f"error: {message()}", file=sys.stderr)
-        code = BAD_INPUT
-    sys.exit(code)
+        return _refused(" ".join(str(message()).split()))
+
+
+def _refused(message: str) -> int:
+    print(f"error: {message}", file=sys.stderr)
+    return BAD_INPUT
+
+
+def _interrupted(error: BaseException) -> int:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    words = str(error) if isinstance(error, Interrupted) else ""
+    print(words or "interrupted", file=sys.stderr)
+    return INTERRUPTED

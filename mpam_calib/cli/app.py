@@ -7,9 +7,11 @@ import typer
 app = typer.Typer(
     name="mpam-calib",
     help="Bayesian calibration of pneumatic artificial muscles.",
-    no_args_is_help=True,
+    epilog="SPECIMEN is a specimen folder or its specimen.toml; RUN a folder that calibrate wrote.",
     add_completion=False,
     pretty_exceptions_enable=False,
+    # Plain text: readable in a narrow window and in a log.
+    rich_markup_mode=None,
 )
 
 # The commands, in the order in which the help lists them; each module registers its own on ``app``.

@@ -9,34 +9,53 @@ import typer
 
 from mpam_calib.cli import NOT_CONVERGED
 from mpam_calib.cli.app import app
+from mpam_calib.errors import Interrupted
 
 
 @app.command()
 def calibrate(
-    specimen: Annotated[Path, typer.Argument(help="specimen folder or its specimen.toml")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="the RUN folder to write")],
-    seed: Annotated[int, typer.Option(help="seed of every random choice", min=0)] = 0,
-    max_steps: Annotated[int, typer.Option(help="budget: sampling steps of each ensemble", min=1)] = 4000,
-    ess: Annotated[float, typer.Option(help="effective draws wanted of every parameter", min=1)] = 400.0,
-    remainder: Annotated[bool, typer.Option(help="with a remainder for what the physics leaves")] = True,
-    correlated_noise: Annotated[bool, typer.Option(help="with noise that is correlated in time")] = True,
+    specimen: Annotated[
+        Path, typer.Argument(metavar="SPECIMEN", help="Specimen folder, or its specimen.toml.")
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="RUN", help="Folder to write, resume or keep.")
+    ],
+    seed: Annotated[int, typer.Option(help="Seed of every random choice.", min=0)] = 0,
+    max_steps: Annotated[int, typer.Option(help="Budget: sampling steps of each ensemble.", min=1)] = 4000,
+    ess: Annotated[float, typer.Option(help="Effective draws wanted of every parameter.", min=1)] = 400.0,
+    remainder: Annotated[
+        bool, typer.Option("--remainder/--no-remainder", help="Allow for what the physics leaves out.")
+    ] = True,
+    correlated_noise: Annotated[
+        bool,
+        typer.Option("--correlated-noise/--no-correlated-noise", help="Allow for noise that lasts."),
+    ] = True,
 ) -> None:
-    """Draw the posterior of the declared simulation; writes draws, tables, bands and a report."""
+    """Draw the posterior of a specimen's simulation.
+
+    Writes draws, summary, bands and a report to RUN.
+
+    The same command on an unfinished RUN resumes it and keeps a finished one; other data, another
+    model or seed replaces it. Exit code 3: not converged within the budget; a larger one resumes.
+    """
     from mpam_calib.cli.progress import sampling_progress
     from mpam_calib.model.blueprint import Options
     from mpam_calib.run.calibrate import calibrate_to_folder
 
     options = Options(remainder=remainder, correlated_noise=correlated_noise)
-    with sampling_progress(max_steps) as listener:
-        outcome = calibrate_to_folder(
-            specimen,
-            output,
-            seed=seed,
-            max_steps=max_steps,
-            ess_wanted=ess,
-            options=options,
-            listener=listener,
-        )
+    try:
+        with sampling_progress(max_steps) as listener:
+            outcome = calibrate_to_folder(
+                specimen,
+                output,
+                seed=seed,
+                max_steps=max_steps,
+                ess_wanted=ess,
+                options=options,
+                listener=listener,
+            )
+    except KeyboardInterrupt as error:
+        raise Interrupted("interrupted: what was drawn is kept, the same command goes on from it") from error
     what = "kept (same data, model and options)" if outcome.kept else "written"
     print(f"{output / 'report.html'} {what}")
     if not outcome.converged:

@@ -7,9 +7,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
 if TYPE_CHECKING:
     from mpam_calib.posterior.sampling import Listener
     from mpam_calib.posterior.sampling import Progress as Figures
@@ -17,24 +14,34 @@ if TYPE_CHECKING:
 
 @contextmanager
 def sampling_progress(max_steps: int) -> Iterator[Listener]:
-    """A listener that draws a bar on standard error."""
+    """A listener that draws a bar on standard error; in a pipe or a log it stays quiet."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    console = Console(file=sys.stderr)
+    if not console.is_terminal:
+        yield lambda figures: None
+        return
     columns = (
         TextColumn("{task.description:<11}"),
-        BarColumn(),
+        BarColumn(bar_width=24),
         TimeElapsedColumn(),
-        TextColumn("left"),
+        TextColumn("gone,"),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[figures]}"),
+        TextColumn("left {task.fields[figures]}"),
     )
-    with Progress(*columns, console=Console(file=sys.stderr), transient=True) as bar:
+    with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("reading", total=1.0, figures="")
+        share = 0.0
 
         def tell(figures: Figures) -> None:
-            spent = figures.steps / max_steps
+            nonlocal share
             text = ""
             if figures.steps:
-                text = f"{figures.steps} steps, ESS {figures.ess:.0f}, R-hat {figures.rhat:.3f}"
-            # Whatever comes first ends the run: enough draws, or the budget.
-            bar.update(task, description=figures.stage, completed=max(figures.share, spent), figures=text)
+                text = f"({figures.steps} steps, ESS {figures.ess:.0f}, R-hat {figures.rhat:.3f})"
+            # Whatever comes first ends the run: enough draws, or the budget. An estimate may fall
+            # back, the bar does not.
+            share = max(share, figures.share, figures.steps / max_steps)
+            bar.update(task, description=figures.stage, completed=share, figures=text)
 
         yield tell

@@ -1,9 +1,17 @@
-"""Blocks of draws on disk: written whole or not at all, each with the states to resume from."""
+"""Blocks of draws on disk: written whole or not at all, each with the states to resume from.
+
+A part is one line of text that seals it, then a zip archive of plain arrays (``.npz``, read without pickle)
+with a JSON text that says how they hang together. Reading one can only build dataclasses of this package.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import hashlib
+import importlib
+import io
+import json
 import os
-import pickle
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -11,13 +19,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-FORMAT = 1
+import numpy as np
+from numpy.typing import NDArray
+
+Arrays = dict[str, NDArray[Any]]
+
+HEADER = "mpam-calib checkpoint 2"
+TREE = "tree"
+UNFINISHED = ".part"
+"""Suffix of a file that is being written; a killed process may leave one behind."""
+PACKAGE = __name__.partition(".")[0]
+
+
+class Damaged(ValueError):
+    """A part that does not hold what its digest says, or that no version of this package wrote."""
 
 
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     """Let ``write`` fill a temporary file beside ``path``, then put it in place in one step."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=UNFINISHED)
     os.close(handle)
     temporary = Path(name)
     try:
@@ -29,26 +50,112 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
         temporary.unlink(missing_ok=True)
 
 
+def sweep(folder: Path) -> None:
+    """Remove the unfinished files that a killed process left in a folder."""
+    for path in folder.glob(f".*{UNFINISHED}"):
+        path.unlink(missing_ok=True)
+
+
 @dataclass(frozen=True)
 class Checkpoint:
-    """A folder of numbered parts that belong to one digest of data, model and options."""
+    """A folder of named parts that belong to one digest of data, model and options."""
 
     folder: Path
     digest: str
 
     def save(self, name: str, part: Any) -> None:
-        """Store one part under a name."""
-        payload = pickle.dumps((FORMAT, self.digest, part), protocol=5)
-        write_atomically(self.folder / f"{name}.pickle", lambda path: path.write_bytes(payload))
+        """Store one part under a name: numbers, texts, arrays, dataclasses of this package, their lists."""
+        payload = pack(part, self.digest)
+        write_atomically(self._path(name), lambda path: path.write_bytes(payload))
 
     def load(self, name: str) -> Any | None:
         """A part stored under this name and digest, or None; a damaged part counts as missing."""
         try:
-            form, digest, part = pickle.loads((self.folder / f"{name}.pickle").read_bytes())
-        except (OSError, pickle.UnpicklingError, EOFError, ValueError, TypeError, AttributeError):
+            return unpack(self._path(name).read_bytes(), self.digest)
+        except (OSError, Damaged):
             return None
-        return part if (form, digest) == (FORMAT, self.digest) else None
 
     def clear(self) -> None:
         """Remove all parts."""
         shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _path(self, name: str) -> Path:
+        return self.folder / f"{name}.checkpoint"
+
+
+def pack(part: Any, digest: str) -> bytes:
+    """The bytes of a part: a line with the run's digest and the seal, then the archive."""
+    arrays: Arrays = {}
+    tree = json.dumps(_encode(part, arrays))
+    stream = io.BytesIO()
+    np.savez(stream, allow_pickle=False, **{TREE: np.frombuffer(tree.encode(), dtype=np.uint8)}, **arrays)
+    archive = stream.getvalue()
+    return f"{HEADER} {digest} {_seal(digest, archive)}\n".encode() + archive
+
+
+def unpack(payload: bytes, digest: str) -> Any:
+    """What ``pack`` stored; raises ``Damaged`` where anything is amiss or the digest is another."""
+    header, _, archive = payload.partition(b"\n")
+    if header != f"{HEADER} {digest} {_seal(digest, archive)}".encode():
+        raise Damaged("cut, changed, or another run's")
+    try:
+        with np.load(io.BytesIO(archive), allow_pickle=False) as stored:
+            arrays: Arrays = {name: stored[name] for name in stored.files}
+        return _decode(json.loads(arrays.pop(TREE).tobytes()), arrays)
+    # Whole, but of another version of this package: a class or a field that is no longer there.
+    except (KeyError, ValueError, TypeError, AttributeError, ImportError) as error:
+        raise Damaged(str(error)) from error
+
+
+def _seal(digest: str, archive: bytes) -> str:
+    return hashlib.sha256(digest.encode() + archive).hexdigest()
+
+
+def _encode(item: Any, arrays: Arrays) -> Any:
+    """JSON for ``item``; its arrays go to ``arrays`` under running names."""
+    if item is None or type(item) in (bool, int, float, str):
+        return item
+    if isinstance(item, np.ndarray | np.generic):
+        name = f"a{len(arrays)}"
+        arrays[name] = np.asarray(item)
+        return {"scalar" if isinstance(item, np.generic) else "array": name}
+    if type(item) in (list, tuple):
+        return {type(item).__name__: [_encode(value, arrays) for value in item]}
+    if type(item) is dict and all(type(key) is str for key in item):
+        return {"dict": {key: _encode(value, arrays) for key, value in item.items()}}
+    if dataclasses.is_dataclass(item) and type(item).__module__.split(".")[0] == PACKAGE:
+        fields = {f.name: _encode(getattr(item, f.name), arrays) for f in dataclasses.fields(item)}
+        return {"class": f"{type(item).__module__}:{type(item).__qualname__}", "fields": fields}
+    raise TypeError(f"a checkpoint cannot hold {type(item).__qualname__}")
+
+
+def _decode(tree: Any, arrays: Arrays) -> Any:
+    if not isinstance(tree, dict):
+        return tree
+    if "class" in tree:
+        return _class(tree["class"])(**{k: _decode(v, arrays) for k, v in tree["fields"].items()})
+    ((kind, content),) = tree.items()
+    match kind:
+        case "array":
+            return arrays[content]
+        case "scalar":
+            return arrays[content][()]
+        case "list":
+            return [_decode(value, arrays) for value in content]
+        case "tuple":
+            return tuple(_decode(value, arrays) for value in content)
+        case "dict":
+            return {key: _decode(value, arrays) for key, value in content.items()}
+        case _:
+            raise Damaged(f"unknown kind {kind}")
+
+
+def _class(name: str) -> type[Any]:
+    """A dataclass of this package by its name; nothing else can be asked for."""
+    module, _, qualname = name.partition(":")
+    if module.split(".")[0] != PACKAGE:
+        raise Damaged(f"a class from elsewhere: {module}")
+    found = getattr(importlib.import_module(module), qualname)
+    if not (isinstance(found, type) and dataclasses.is_dataclass(found)):
+        raise Damaged(f"not a dataclass: {name}")
+    return found

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 from mpam_calib.calibration import calibrate
-from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options
 from mpam_calib.posterior.convergence import ESS_WANTED
-from mpam_calib.posterior.sampling import MAX_STEPS, Listener
-from mpam_calib.run.folder import RunFolder, material_of, run_digest
+from mpam_calib.posterior.sampling import BLOCK, MAX_STEPS, Listener, Progress
+from mpam_calib.run.folder import REPORT, RunFolder, material_of, run_digest
 from mpam_calib.specimen import Specimen, read
-
-OUTPUTS = ("posterior.nc", "summary.csv", "bands.csv", "run.json", "report.html", "predictions.csv")
 
 
 @dataclass(frozen=True)
@@ -60,14 +56,14 @@ def calibrate_to_folder(
         material=None if material is None else material.model_dump(),
     )
     folder = RunFolder(run, digest)
-    if run.exists() and not run.is_dir():
-        raise InputError(run, "a file", "a folder to write into, or a new name")
+    folder.demand_writable()
     state = folder.state()
-    complete = state is not None and all((run / name).exists() for name in OUTPUTS[:-1])
-    if complete and state is not None:
+    if state is not None and folder.complete():
         used = int(state["sampling"]["steps"])
-        if state["converged"] or max_steps <= used:
+        if state["converged"] or max_steps < used + BLOCK:
             return Outcome(bool(state["converged"]), kept=True)
+    tell = listener or (lambda progress: None)
+    tell(Progress("fitting", 0, float("nan"), 0.0, 0.0))
     calibration = calibrate(
         specimen,
         seed=seed,
@@ -78,13 +74,17 @@ def calibrate_to_folder(
         checkpoint=folder.checkpoint,
         listener=listener,
     )
-    for name in OUTPUTS:
-        (run / name).unlink(missing_ok=True)
+    figures = calibration.sampling.diagnostics
+    ess = float(min(figures.ess_bulk.min(), figures.ess_tail.min()))
+    steps = calibration.sampling.chain.shape[1]
+    tell(Progress("reporting", steps, float(figures.rhat.max()), ess, 1.0))
     from mpam_calib.report.calibration import calibration_page
     from mpam_calib.run.view import view_of
 
+    page = calibration_page(view_of(calibration))
+    folder.clear()
+    page.write(run / REPORT)
     folder.write(calibration)
-    calibration_page(view_of(calibration)).write(run / "report.html")
     if calibration.converged:
-        shutil.rmtree(run / "checkpoint", ignore_errors=True)
+        folder.checkpoint.clear()
     return Outcome(calibration.converged, kept=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,15 @@ from mpam_calib.calibration import Calibration
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Blueprint, MaterialPosterior
 from mpam_calib.model.model import Model, build_model
-from mpam_calib.posterior.checkpoint import Checkpoint, write_atomically
+from mpam_calib.posterior.checkpoint import Checkpoint, sweep, write_atomically
 from mpam_calib.posterior.draws import Draws, reported
 from mpam_calib.run.files import write_csv, write_json
 
+REPORT = "report.html"
+WRITTEN = ("run.json", "posterior.nc", "summary.csv", "bands.csv", REPORT)
+"""What a finished calibration leaves."""
+DERIVED = ("predictions.csv", "designs.csv")
+"""What later commands add, and what goes when the posterior they came from goes."""
 PACKAGES = ("mpam-calib", "arviz", "emcee", "numpy", "scipy", "pandas")
 
 
@@ -53,9 +59,29 @@ class RunFolder:
             return None
         return content if content.get("digest") == self.digest else None
 
+    def complete(self) -> bool:
+        """Whether all that a finished calibration leaves is there."""
+        return all((self.path / name).is_file() for name in WRITTEN)
+
+    def demand_writable(self) -> None:
+        """Raise ``InputError`` where the folder cannot be written, or not be made."""
+        if self.path.exists() and not self.path.is_dir():
+            raise InputError(self.path, "a file", "a folder to write into, or a new name")
+        there = next(path for path in (self.path.absolute(), *self.path.absolute().parents) if path.exists())
+        if not there.is_dir():
+            raise InputError(there, "a file", "a folder to make the run in")
+        if not os.access(there, os.W_OK | os.X_OK):
+            raise InputError(there, "a folder that may not be written", "one that may")
+
+    def clear(self) -> None:
+        """Remove an older run's results, the mark of a finished run first, and what was left half-written."""
+        self.path.mkdir(parents=True, exist_ok=True)
+        for name in (*WRITTEN, *DERIVED):
+            (self.path / name).unlink(missing_ok=True)
+        sweep(self.path)
+
     def write(self, calibration: Calibration) -> None:
         """Write everything but the report; ``run.json`` comes last, as the mark of a finished run."""
-        (self.path / "run.json").unlink(missing_ok=True)
         write_csv(calibration.summary, self.path / "summary.csv")
         write_csv(calibration.bands(), self.path / "bands.csv")
         write_posterior(calibration, self.path / "posterior.nc")
@@ -113,12 +139,12 @@ def write_posterior(calibration: Calibration, path: Path) -> None:
         sample_stats={"lp": log_prob.reshape(chains, -1)},
         attrs={"inference_library": "emcee", "digest": calibration.specimen.digest},
     )
-    data.add_groups({"sampler_coordinates": sampler}, warn_on_custom_groups=False)
+    coordinates = az.dict_to_dataset(sampler, library=None)
+    data.add_groups({"sampler_coordinates": coordinates}, warn_on_custom_groups=False)
     for group in data.groups():
         # A time of writing would make two equal runs differ.
         data[group].attrs.pop("created_at", None)
-        for name in ("digest",):
-            data[group].attrs.setdefault(name, calibration.specimen.digest)
+        data[group].attrs.setdefault("digest", calibration.specimen.digest)
     write_atomically(path, lambda p: data.to_netcdf(str(p), engine="h5netcdf"))
 
 

@@ -37,7 +37,7 @@ def view_of(calibration: Calibration) -> CalibrationView:
     """The report's view of a calibration."""
     specimen, model, sampling = calibration.specimen, calibration.model, calibration.sampling
     summary = calibration.summary
-    worst = summary.loc[summary["rhat"].idxmax()]
+    worst = summary.iloc[int(summary["rhat"].to_numpy().argmax())]
     ensembles, steps, walkers, _ = sampling.chain.shape
     observed, remainder, noise = _observed(calibration)
     headline = _headline(calibration)
