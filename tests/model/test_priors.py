@@ -7,15 +7,17 @@ import pytest
 from scipy import integrate, special, stats
 
 from mpam_calib.model.model import build_model
-from mpam_calib.model.priors import BelowNormal, HalfNormal, LogNormal, LogUniform, Normal, Uniform
+from mpam_calib.model.priors import HalfNormal, LogNormal, LogUniform, Normal, NormalWithin, Uniform
 
 from .build import blueprint
 
 CASES = {
     "normal": (Normal(3.0, 2.0), stats.norm(3.0, 2.0)),
-    "below": (BelowNormal(1.0, 2.0, 2.5), stats.truncnorm(-np.inf, 0.75, 1.0, 2.0)),
-    "far below": (BelowNormal(0.0, 1.0, -2.0), stats.truncnorm(-np.inf, -2.0, 0.0, 1.0)),
-    "no bound": (BelowNormal(0.0, 1.5, np.inf), stats.norm(0.0, 1.5)),
+    "below": (NormalWithin(1.0, 2.0, -np.inf, 2.5), stats.truncnorm(-np.inf, 0.75, 1.0, 2.0)),
+    "far below": (NormalWithin(0.0, 1.0, -np.inf, -2.0), stats.truncnorm(-np.inf, -2.0, 0.0, 1.0)),
+    "above": (NormalWithin(0.5, 2.0, -0.5, np.inf), stats.truncnorm(-0.5, np.inf, 0.5, 2.0)),
+    "between": (NormalWithin(0.0, 3.0, -1.0, 2.0), stats.truncnorm(-1.0 / 3.0, 2.0 / 3.0, 0.0, 3.0)),
+    "no bound": (NormalWithin(0.0, 1.5, -np.inf, np.inf), stats.norm(0.0, 1.5)),
     "log-normal": (LogNormal(0.2, 0.7), stats.lognorm(0.7, scale=0.2)),
     "half-normal": (HalfNormal(0.2), stats.halfnorm(scale=0.2)),
     "uniform": (Uniform(-1.0, 4.0), stats.uniform(-1.0, 5.0)),

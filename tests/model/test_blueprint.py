@@ -1,0 +1,124 @@
+"""A blueprint goes to JSON and back unchanged, and holds nothing of the forces but where pulling begins."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from mpam_calib.model.blueprint import Blueprint, MaterialPosterior, Options, draw_blueprint
+from mpam_calib.model.model import build_model
+from mpam_calib.specimen.declaration import Fit, Geometry, GeometrySd, Sensors
+from mpam_calib.specimen.recording import FreeContraction, Tensile
+
+from . import build
+
+MATERIAL = MaterialPosterior(
+    mean=(4e4, 1.0 / 3.0), covariance=((1e6, 0.1), (0.1, 7.0)), strain_range=(0.0, 1.0), convention="stretch"
+)
+TENSILE = Tensile(np.linspace(-0.1, 2.0, 30), np.linspace(-1e3, 1e5, 30))
+CASES = {
+    "loops": build.blueprint({"law": "linear", "order": 4}),
+    "everything": build.blueprint(
+        {"law": "exponential_each", "order": 3, "friction": "strand", "effects": ("dead_band", "tip_shape")},
+        Options(correlated_noise=False, remainder=True, nuisances=False),
+        sensors=Sensors(force_sd_N=0.1 + 0.2, pressure_bias_sd_kPa=22.5, force_floor_N=0.0),
+        geometry=Geometry(
+            L0_mm=50.1, R0_mm=3.3, t0_mm=0.7, alpha0_deg=72.1, sd=GeometrySd(alpha0_deg=1.0, L0_mm=0.1)
+        ),
+        free_contraction=FreeContraction(np.array([1e5]), np.array([0.3])),
+    ),
+    "tensile": build.blueprint(
+        {"moduli": "tensile", "order": 2, "law": "constant"},
+        tensile=TENSILE,
+        fit=Fit(tensile_strain=(0.1, 1.3)),
+    ),
+    "material": build.blueprint({"moduli": "run:../other", "order": 2, "law": "constant"}).model_copy(
+        update={"material": MATERIAL}
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_there_and_back(case):
+    drawn = CASES[case]
+    again = Blueprint.model_validate_json(drawn.model_dump_json())
+    assert again == drawn
+    assert again.model_dump_json() == drawn.model_dump_json()
+    first, second = build_model(drawn), build_model(again)
+    assert first.parameters == second.parameters
+    assert first.linear_sizes == second.linear_sizes
+    u = np.random.default_rng(0).standard_normal((3, len(first.names)))
+    values = first.values(u)
+    a, b = (m.moduli.transform(values) for m in (first, second))
+    assert np.array_equal(a[0], b[0])
+    assert np.array_equal(a[1], b[1])
+
+
+def test_a_blueprint_cannot_be_changed():
+    with pytest.raises(ValidationError):
+        CASES["loops"].stroke = 1.0
+
+
+def test_an_unknown_key_is_refused():
+    text = CASES["loops"].model_dump_json().replace('"stroke":', '"stoke":')
+    with pytest.raises(ValidationError):
+        Blueprint.model_validate_json(text)
+
+
+def test_it_does_not_know_the_forces():
+    made = build.specimen({"law": "linear", "order": 3}, build.loops())
+    rng = np.random.default_rng(0)
+    forces = [40.0 + 10.0 * rng.standard_normal(72) for _ in range(2)]
+    drawn = [draw_blueprint(build.with_force(made, np.maximum(f, 5.0))) for f in forces]
+    assert drawn[0] == drawn[1]
+
+
+def test_where_pulling_begins_is_a_pressure_with_a_clear_pull():
+    made = build.specimen({"law": "linear", "order": 3}, build.loops((50.0, 100.0, 200.0)))
+    assert made.loops is not None
+    pulling = np.where(made.loops.level > 0, 30.0, 0.1)
+    assert draw_blueprint(build.with_force(made, pulling)).pulls_at == pytest.approx(1e5)
+    assert draw_blueprint(build.with_force(made, np.full(72, 30.0))).pulls_at == pytest.approx(5e4)
+
+
+def test_stroke_reach_and_times():
+    recorded = build.loops((100.0, 200.0), strokes_mm=(6.0, 12.0), rows=10, dt=0.2)
+    drawn = draw_blueprint(build.with_force(build.specimen(None, recorded), np.full(40, 9.0)))
+    assert drawn.stroke == pytest.approx(12e-3 * 9.5 / 10)
+    assert drawn.reach == pytest.approx((0.12 * 9.5 / 10, 0.24 * 9.5 / 10))
+    assert drawn.stroke_time == pytest.approx(0.2 * 9)
+    assert drawn.levels == (1e5, 2e5)
+    assert drawn.branches
+
+
+def test_the_tensile_range():
+    made = build.specimen(
+        {"moduli": "tensile", "order": 2, "law": "constant"}, build.loops(), tensile=TENSILE
+    )
+    made = build.with_force(made, np.full(72, 9.0))
+    assert draw_blueprint(made).tensile_range == (0.0, 2.0)
+    narrowed = replace(made, fit=Fit(tensile_strain=(0.1, 1.3)))
+    assert draw_blueprint(narrowed).tensile_range == (0.1, 1.3)
+
+
+@pytest.mark.parametrize(
+    ("options", "gone"),
+    [
+        (Options(remainder=False), {"remainder_sd_N", "stroke_remainder_sd_N"}),
+        (Options(correlated_noise=False), {"noise_corr_sd_N", "noise_corr_time_s"}),
+        (Options(nuisances=False), {"alpha0_deg", "pressure_bias_kPa"}),
+    ],
+)
+def test_options_leave_out_what_they_name(options, gone):
+    parts = {
+        "geometry": Geometry(
+            L0_mm=50.0, R0_mm=3.0, t0_mm=0.7, alpha0_deg=72.0, sd=GeometrySd(alpha0_deg=1.0)
+        ),
+        "sensors": Sensors(force_sd_N=0.2, pressure_bias_sd_kPa=5.0),
+    }
+    full = build_model(build.blueprint({"law": "linear", "order": 2}, **parts))
+    less = build_model(build.blueprint({"law": "linear", "order": 2}, options, **parts))
+    assert set(full.names) - set(less.names) == gone

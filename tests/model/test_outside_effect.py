@@ -1,0 +1,97 @@
+"""An effect registered from outside the package calibrates like its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpam_calib.model import effect as registry
+from mpam_calib.model import effect_ids
+from mpam_calib.model.blueprint import draw_blueprint
+from mpam_calib.model.effect import Effect, Stage, effect, known_effects, register
+from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.posterior.target import build_target, locate, predict_force
+
+from . import build
+
+IDENTIFIER = "temperature_zero"
+SWING = 0.8
+
+
+def _parameters(setting):
+    return (Parameter("swing_N", Normal(0.0, 2.0), "daily swing of the load cell's zero"),)
+
+
+def _apply(state, values, setting):
+    return replace(state, zero=state.zero + values["swing_N"] * np.sin(5.0 * state.readings.time))
+
+
+@pytest.fixture
+def outside() -> Iterator[Effect]:
+    made = register(
+        Effect(
+            id=IDENTIFIER,
+            stage=Stage.SENSOR,
+            title="Swing of the zero",
+            sentence="the load cell's zero swings with the room's temperature",
+            source="a test",
+            parameters=_parameters,
+            apply=_apply,
+        )
+    )
+    effect_ids.add_effect_id(IDENTIFIER)
+    yield made
+    # There is no call for this: an effect stays for as long as the process does.
+    del registry._REGISTRY[IDENTIFIER]
+    effect_ids._added.remove(IDENTIFIER)
+
+
+def test_it_is_known(outside):
+    assert effect(IDENTIFIER) is outside
+    assert IDENTIFIER in known_effects()
+    assert IDENTIFIER in effect_ids.known_effect_ids()
+    assert known_effects()[-1] == IDENTIFIER  # in the chain's order: a sensor's effect comes last
+
+
+def test_an_id_can_be_taken_only_once(outside):
+    with pytest.raises(ValueError, match="registered already"):
+        register(outside)
+    effect_ids.add_effect_id(IDENTIFIER)
+    assert effect_ids.known_effect_ids().count(IDENTIFIER) == 1
+
+
+def test_it_calibrates(outside):
+    """A swing of 0.8 N is found again to 4 posterior sds; without the effect it counts as noise."""
+    recorded = build.loops(rows=16, cycles=2)
+    with_it = {"law": "linear", "order": 2, "effects": (IDENTIFIER,)}
+    made = build.with_force(build.specimen(with_it, recorded), np.full(192, 20.0))
+    blueprint = draw_blueprint(made, build.PLAIN)
+    target = build_target(made, blueprint)
+    assert target.model.names == ("K_f", "swing_N", "noise_sd_N")
+    rng = np.random.default_rng(2)
+    truth = {"K_f": np.array([[0.05]]), "swing_N": np.array([[SWING]])}
+    eta = 0.3 * rng.standard_normal((1, 4))
+    force = predict_force(target.model, truth, eta, build.rows_of(recorded))[0]
+    made = build.with_force(made, force + 0.2 * rng.standard_normal(len(force)))
+    target, modes = locate(build_target(made, blueprint), np.random.default_rng(0))
+    i = target.model.names.index("swing_N")
+    mean = float(target.model.values(modes[0].u[None])["swing_N"][0, 0])
+    sd = 2.0 * float(np.sqrt(modes[0].covariance[i, i]))  # the prior is normal with sd 2
+    assert sd < 0.1
+    assert abs(mean - SWING) < 4.0 * sd
+    # A quick swing that no modulus follows: rms 0.57 N beside 0.2 N of noise make 0.60 N.
+    without = replace(made, simulation=made.simulation.model_copy(update={"effects": ()}))
+    bare, bare_modes = locate(
+        build_target(without, draw_blueprint(without, build.PLAIN)), np.random.default_rng(0)
+    )
+    noise = float(bare.model.values(bare_modes[0].u[None])["noise_sd_N"][0, 0])
+    assert noise > 0.5
+    assert modes[0].log_evidence > bare_modes[0].log_evidence + 20.0
+
+
+def test_it_is_gone_afterwards():
+    assert IDENTIFIER not in known_effects()
+    assert IDENTIFIER not in effect_ids.known_effect_ids()
