@@ -24,6 +24,15 @@ def enter(ledger: Ledger) -> None:
                 ledger.unprinted(FIGURE[muscle], row, f"F(γ={gamma:g}) of {muscle} (N)", F, how)
             root = decoded.first_root(float(P), E[i])
             ledger.unprinted("Fig. 4.10", row, f"free contraction of {muscle}", root, how)
+    for P, E, level in zip(decoded.LEVELS, decoded.moduli("MPAM2"), laws.P_KPA, strict=True):
+        pair = decoded.force(P, np.array([0.0, 0.05]), E)
+        ledger.unprinted(
+            "Fig. 4.18",
+            f"{level:.0f} kPa",
+            "F(0.05)/F(0) of MPAM2",
+            float(pair[1] / pair[0]),
+            "the 50 kPa curve is unlike the others: an outlier",
+        )
     _nonlinear_term(ledger)
     _blocked_slope(ledger)
     points = np.array([0.0, 0.1, 0.2, 0.3])

@@ -192,6 +192,24 @@ def _force_of_the_laws(ledger: Ledger) -> None:
                 f"Table {decoded.MUSCLES[muscle]} decodes to {true[i]:.2f} N; the law is off by "
                 f"{error[i]:+.1f} N: {why}",
             )
+    for i, (P, sd) in enumerate(zip(laws.P_KPA, rounding_of_exponential(), strict=True)):
+        ledger.unprinted(
+            "Table 4.9",
+            f"{P:.0f} kPa",
+            "sd of F(γ=0) by the rounding of the constants (N)",
+            sd,
+            f"four digits each; the law is off by {laws.force_error('MPAM2', exponential)[i]:+.1f} N there",
+        )
+    for muscle, name in decoded.MUSCLES.items():
+        E = decoded.moduli(muscle)
+        for P, row in zip(laws.P_KPA, E, strict=True):
+            ledger.unprinted(
+                f"Table {name}",
+                f"{P:.0f} kPa",
+                "sum of the moduli (Pa)",
+                float(row.sum()),
+                f"their sizes add up to {np.abs(row).sum():.2e} Pa: they cancel",
+            )
     full = laws.force_error("MPAM1", laws.full_line())
     for i, P in enumerate(laws.P_KPA):
         ledger.unprinted(
@@ -208,6 +226,27 @@ def _force_of_the_laws(ledger: Ledger) -> None:
         _rms_to_free_contraction(),
         "five curves, 200 points each",
     )
+
+
+def rounding_of_exponential() -> Array:
+    """Standard deviation of F(γ=0) (N) that four-digit constants of Table 4.9 leave, at each level.
+
+    Every constant is taken as uniform within its last digit.
+    """
+    constants = table("4.9")
+    C = constants.values()
+    half = np.array([[significant_half_unit(text) for text in row] for row in constants.cells])
+    lever = decoded.columns(np.asarray(0.0), C.shape[1])
+    variance = np.zeros(laws.P_KPA.size)
+    for i in range(C.shape[0]):
+        changed = C.copy()
+        changed[i] += half[i]
+        shift = (
+            laws.double_exponential(changed, laws.P_KPA) - laws.double_exponential(C, laws.P_KPA)
+        ) * lever
+        variance += np.sum(shift**2, axis=1) / 3.0
+    spread: Array = np.sqrt(variance)
+    return spread
 
 
 def _rms_to_free_contraction() -> float:
