@@ -81,6 +81,7 @@ class Blueprint(Value):
             force_scale=force_scale(self.geometry, levels),
             force_sd=self.sensors.force_sd_N,
             pressure_bias_sd=self.sensors.pressure_bias_sd,
+            nuisances=self.options.nuisances,
             pulls_at=self.pulls_at,
         )
 

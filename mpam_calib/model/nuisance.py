@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mpam_calib.model.effect import Values
-from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.priors import Normal, NormalWithin, Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.units import si_factor
 
@@ -24,8 +24,9 @@ def nuisance_parameters(setting: Setting) -> tuple[Parameter, ...]:
         if sd > 0.0 and not matching:
             prior = Normal(getattr(setting.geometry, attribute), sd)
             parameters.append(Parameter(name, prior, "declared, uncertain", "specimen.toml"))
-    if setting.pressure_bias_sd > 0.0:
-        prior = Normal(0.0, setting.pressure_bias_sd)
+    if setting.pressure_bias_sd > 0.0 and "dead_band" not in setting.simulation.effects:
+        # A level at which the muscle was seen to pull had some pressure.
+        prior = NormalWithin(0.0, setting.pressure_bias_sd, -setting.pulls_at, np.inf)
         parameters.append(Parameter(BIAS, prior, "true pressure minus the gauge's reading", "specimen.toml"))
     return tuple(parameters)
 

@@ -31,6 +31,8 @@ class Setting:
     force_scale: float
     force_sd: float | None
     pressure_bias_sd: float = 0.0
+    nuisances: bool = True
+    """Whether declared uncertainties are sampled."""
     pulls_at: float = np.inf
     """The lowest pressure (Pa) at which the recordings show the muscle pulling."""
 

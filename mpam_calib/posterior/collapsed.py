@@ -267,7 +267,7 @@ def _white_piece(design: Array, residual: Array, variance: Array) -> Piece:
 
 
 def _segment_piece(covariance: Array, kind: NDArray[np.int64], padded: Array, rows: int) -> Piece:
-    """The share of correlated segments: covariance (B, K, m, m) by kind (S,), [A r] padded (B, S, m, k + 1)."""
+    """Correlated segments: covariance (B, K, m, m), kind (S,), [A r] padded (B, S, m, k + 1)."""
     B, S, m, width = padded.shape
     factor = _cholesky(covariance)
     log_dets = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=2, axis2=3)), axis=2)

@@ -59,6 +59,11 @@ def advance(task: tuple[EnsembleState, StudentMixture, int]) -> Block:
     )
 
 
+def evaluate_held(u: Array) -> Array:
+    """Log posterior (n,) of points (n, d) under the worker's target."""
+    return evaluate(held_target(), u)
+
+
 def start_states(
     target: Collapsed, mixture: StudentMixture, walkers: int, seeds: list[int]
 ) -> list[EnsembleState]:

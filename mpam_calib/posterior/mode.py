@@ -97,13 +97,8 @@ def _structured(target: Collapsed, u: Array) -> Array:
     return other
 
 
-def find_modes(target: Collapsed, rng: np.random.Generator, start: Array | None = None) -> list[Mode]:
-    """Distinct modes, best first: from the priors' centre (or a start) and the best of some prior draws."""
-    d = len(target.model.names)
-    draws = rng.standard_normal((32, d))
-    best = draws[np.argsort(-evaluate(target, draws))[:2]]
-    centre = np.zeros(d) if start is None else start
-    starts = [centre, _structured(target, centre), *best]
+def climb_modes(target: Collapsed, starts: list[Array]) -> list[Mode]:
+    """Distinct modes that climbs from the starts lead to, best first."""
     with workers(target, len(starts)) as pool:
         ends = pool.map(_climb_held, starts, chunksize=1)
     found: list[Mode] = []
@@ -112,6 +107,15 @@ def find_modes(target: Collapsed, rng: np.random.Generator, start: Array | None 
             continue
         covariance = curvature(target, u, top)
         precision = np.linalg.inv(covariance)
-        if all((u - m.u) @ precision @ (u - m.u) > 4.0 * d for m in found):
+        if all((u - m.u) @ precision @ (u - m.u) > 4.0 * len(u) for m in found):
             found.append(Mode(u, top, covariance))
     return found
+
+
+def find_modes(target: Collapsed, rng: np.random.Generator) -> list[Mode]:
+    """Modes from the priors' centre, a structured start and the best of some prior draws."""
+    d = len(target.model.names)
+    draws = rng.standard_normal((32, d))
+    best = draws[np.argsort(-evaluate(target, draws))[:2]]
+    centre = np.zeros(d)
+    return climb_modes(target, [centre, _structured(target, centre), *best])

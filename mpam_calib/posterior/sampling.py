@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from mpam_calib.posterior.checkpoint import Checkpoint
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.convergence import ESS_WANTED, Diagnostics, diagnose_chains
-from mpam_calib.posterior.ensembles import Block, EnsembleState, advance, start_states
+from mpam_calib.posterior.ensembles import Block, EnsembleState, advance, evaluate_held, start_states
 from mpam_calib.posterior.mode import Mode
 from mpam_calib.posterior.pool import workers
 from mpam_calib.posterior.proposal import StudentMixture
-from mpam_calib.posterior.warmup import WarmUp, laplace_mixture, warm_up
+from mpam_calib.posterior.warmup import WarmUp, warm_up
 
 Array = NDArray[np.float64]
 
@@ -87,8 +87,15 @@ def sample(
         warm: WarmUp | None = checkpoint.load("warm_up") if checkpoint else None
         if warm is None:
             tell(Progress("warming up", 0, float("nan"), 0.0, 0.0))
-            start = start_states(target, laplace_mixture(modes), walkers_for(len(modes[0].u)), seeds)
-            warm = warm_up(target, modes, start, run)
+            walkers = walkers_for(len(modes[0].u))
+            warm = warm_up(
+                target,
+                modes,
+                starts=lambda mixture: start_states(target, mixture, walkers, seeds),
+                run=run,
+                evaluate=lambda u: np.concatenate(pool.map(evaluate_held, np.array_split(u, ENSEMBLES))),
+                seed=seeds[0],
+            )
             if checkpoint:
                 checkpoint.save("warm_up", warm)
         states = warm.states

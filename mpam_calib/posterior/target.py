@@ -13,7 +13,7 @@ from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import SMOOTH
 from mpam_calib.posterior.bins import bin_loops
 from mpam_calib.posterior.collapsed import Collapsed, Data, Guide
-from mpam_calib.posterior.mode import Mode, find_modes
+from mpam_calib.posterior.mode import Mode, climb_modes, find_modes
 from mpam_calib.posterior.points import gather_points, gather_tensile
 from mpam_calib.specimen.recording import Specimen
 
@@ -57,7 +57,7 @@ def locate(target: Collapsed, rng: np.random.Generator) -> tuple[Collapsed, list
         if not _matters(target, guide):
             break
         target = replace(target, guide=guide)
-        modes = find_modes(target, rng, start=modes[0].u)
+        modes = climb_modes(target, [mode.u for mode in modes])
     return target, modes
 
 

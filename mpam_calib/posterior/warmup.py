@@ -1,7 +1,8 @@
 """Warm-up: fit the independence proposal to the posterior before the draws that count.
 
-Laplace's covariance at the modes starts it; rounds of sampling from over-dispersed walkers then
-refit it until it is accepted often, climbing again from any walker that found a better place.
+Laplace's covariance at the modes starts it; weighted draws from it refit it (adaptive importance
+sampling). Where too few of them carry weight, rounds of the ensembles themselves refit it, climbing
+again from any walker that found a better place. A last round lets the over-dispersed starts settle.
 """
 
 from __future__ import annotations
@@ -19,19 +20,25 @@ from mpam_calib.posterior.proposal import StudentMixture
 
 Array = NDArray[np.float64]
 
-ROUNDS, STEPS = 6, 20
-ENOUGH = 0.3
-"""Accepted share at which the proposal is good enough."""
 INFLATION = 1.15
-BETTER = 3.0
-"""Nats by which a walker must beat every known mode to be climbed from."""
 RELEVANT = 8.0
 """Modes whose evidence is further below the best (nats) get no component of their own."""
+WEIGHTED_ROUNDS, WEIGHTED_DRAWS = 4, 1000
+GOOD_SHARE, POOR_SHARE = 0.5, 0.1
+"""Effective share of weighted draws at which the proposal is good; or so poor that walkers must help."""
+WALKER_ROUNDS, STEPS = 5, 25
+ENOUGH = 0.3
+"""Accepted share at which walkers have fitted the proposal well enough."""
+BETTER = 3.0
+"""Nats by which a walker must beat every known mode to be climbed from."""
+
+Run = Callable[[list[EnsembleState], StudentMixture, int], list[Block]]
+Evaluate = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
 class WarmUp:
-    """Result: states to go on from, the frozen proposal, the modes met, the accepted share by round."""
+    """States to go on from, the frozen proposal, the modes met, and how good it was round by round."""
 
     states: list[EnsembleState]
     mixture: StudentMixture
@@ -39,21 +46,40 @@ class WarmUp:
     accepted: list[float]
 
 
-def laplace_mixture(modes: list[Mode]) -> StudentMixture:
-    """The proposal before anything was drawn."""
-    return StudentMixture.build([m.u for m in modes], [INFLATION**2 * m.covariance for m in modes])
-
-
-def _refit(blocks: list[Block], modes: list[Mode]) -> StudentMixture:
-    """The relevant modes' curvature, and the spread of the walkers in the round's second half (twice)."""
-    drawn = np.concatenate([b.chain[len(b.chain) // 2 :].reshape(-1, b.chain.shape[2]) for b in blocks])
-    covariance = INFLATION**2 * np.cov(drawn.T).reshape(drawn.shape[1], drawn.shape[1])
-    covariance += 1e-10 * np.eye(len(covariance))
+def _components(modes: list[Mode]) -> tuple[list[Array], list[Array]]:
     best = max(mode.log_evidence for mode in modes)
     kept = [mode for mode in modes if mode.log_evidence > best - RELEVANT][:3]
-    means = [mode.u for mode in kept] + [drawn.mean(axis=0)] * 2
-    spreads = [INFLATION**2 * mode.covariance for mode in kept] + [covariance, covariance]
-    return StudentMixture.build(means, spreads)
+    return [mode.u for mode in kept], [INFLATION**2 * mode.covariance for mode in kept]
+
+
+def laplace_mixture(modes: list[Mode]) -> StudentMixture:
+    """The proposal before anything was drawn."""
+    return StudentMixture.build(*_components(modes))
+
+
+def _with_fit(modes: list[Mode], mean: Array, covariance: Array) -> StudentMixture:
+    """The modes' curvature, and (twice) what was drawn."""
+    means, covariances = _components(modes)
+    fitted = INFLATION**2 * covariance + 1e-10 * np.eye(len(mean))
+    return StudentMixture.build([*means, mean, mean], [*covariances, fitted, fitted])
+
+
+def _weigh(modes: list[Mode], evaluate: Evaluate, seed: int) -> tuple[StudentMixture, list[float]]:
+    """Refit by weighted draws; the effective share of each round."""
+    mixture, shares = laplace_mixture(modes), []
+    rng = np.random.RandomState(seed)
+    for _ in range(WEIGHTED_ROUNDS):
+        x = mixture.draw(WEIGHTED_DRAWS, rng)
+        log_weight = evaluate(x) - mixture.log_density(x)
+        weight = np.exp(log_weight - log_weight.max())
+        weight /= weight.sum()
+        effective = 1.0 / float(np.sum(weight**2))
+        shares.append(effective / WEIGHTED_DRAWS)
+        if shares[-1] >= GOOD_SHARE or effective < 5 * x.shape[1]:
+            break
+        mean = weight @ x
+        mixture = _with_fit(modes, mean, (x - mean).T @ ((x - mean) * weight[:, None]))
+    return mixture, shares
 
 
 def _climb_again(target: Collapsed, blocks: list[Block], modes: list[Mode]) -> list[Mode]:
@@ -69,18 +95,29 @@ def _climb_again(target: Collapsed, blocks: list[Block], modes: list[Mode]) -> l
 def warm_up(
     target: Collapsed,
     modes: list[Mode],
-    states: list[EnsembleState],
-    run: Callable[[list[EnsembleState], StudentMixture, int], list[Block]],
+    starts: Callable[[StudentMixture], list[EnsembleState]],
+    run: Run,
+    evaluate: Evaluate,
+    seed: int,
 ) -> WarmUp:
-    """Rounds of sampling and refitting; ``run`` advances all ensembles by some steps."""
-    mixture, accepted = laplace_mixture(modes), []
-    for number in range(ROUNDS):
+    """Fit the proposal, start the ensembles over-dispersed and let them settle.
+
+    ``run`` advances all ensembles by some steps, ``evaluate`` gives the log posterior of many points.
+    """
+    mixture, accepted = _weigh(modes, evaluate, seed)
+    states = starts(mixture)
+    rounds = WALKER_ROUNDS if accepted[-1] < POOR_SHARE else 1
+    for number in range(rounds):
         blocks = run(states, mixture, STEPS)
         states = [block.state for block in blocks]
         accepted.append(float(np.mean([block.accepted for block in blocks])))
-        # The first round still carries the wide starts; after it a good proposal is left alone.
-        if number >= 1 and accepted[-1] >= ENOUGH:
+        if number >= 2 and accepted[-1] >= ENOUGH:
             break
-        modes = _climb_again(target, blocks, modes)
-        mixture = _refit(blocks, modes)
+        # The first round still carries the wide starts.
+        if 0 < number < rounds - 1:
+            modes = _climb_again(target, blocks, modes)
+            drawn = np.concatenate(
+                [b.chain[len(b.chain) // 2 :].reshape(-1, b.chain.shape[2]) for b in blocks]
+            )
+            mixture = _with_fit(modes, drawn.mean(axis=0), np.atleast_2d(np.cov(drawn.T)))
     return WarmUp(states, mixture, modes, accepted)
