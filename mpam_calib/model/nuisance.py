@@ -26,8 +26,8 @@ def nuisance_parameters(setting: Setting) -> tuple[Parameter, ...]:
             parameters.append(Parameter(name, prior, "declared, uncertain", "specimen.toml"))
     if setting.pressure_bias_sd > 0.0 and "dead_band" not in setting.simulation.effects:
         # A level at which the muscle was seen to pull had some pressure.
-        prior = NormalWithin(0.0, setting.pressure_bias_sd, -setting.pulls_at, np.inf)
-        parameters.append(Parameter(BIAS, prior, "true pressure minus the gauge's reading", "specimen.toml"))
+        bias = NormalWithin(0.0, setting.pressure_bias_sd, -setting.pulls_at, np.inf)
+        parameters.append(Parameter(BIAS, bias, "true pressure minus the gauge's reading", "specimen.toml"))
     return tuple(parameters)
 
 

@@ -143,6 +143,26 @@ def bin_loops(loops: Loops) -> LoopBins:
     )
 
 
+def row_readings(loops: Loops) -> Readings:
+    """Every row of the loops as a reading, unreduced."""
+    first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
+    lengths = np.diff(np.append(first, len(loops.stroke)))
+    segment = np.repeat(np.arange(len(first)), lengths)
+    travel, reversal, speed, at_level = _history(loops, first, lengths)
+    return Readings(
+        pressure=loops.pressure_Pa,
+        displacement=loops.displacement_m,
+        sign=np.where(np.abs(loops.branch) == 1, loops.branch, 0).astype(np.float64),
+        level=loops.level,
+        time=loops.time_s,
+        time_at_level=at_level,
+        cycle=loops.cycle.astype(np.float64),
+        travel=travel,
+        reversal=reversal[segment],
+        speed=speed[segment],
+    )
+
+
 def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array, Array]:
     """Travel since the stroke began (rows), whether a reversal began it, its speed, time at the level."""
     segment = np.repeat(np.arange(len(first)), lengths)

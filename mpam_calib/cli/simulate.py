@@ -1,0 +1,43 @@
+"""``mpam-calib simulate SPECIMEN -o DIR [--hide ID[=VALUE] ...]``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mpam_calib.cli.app import app
+from mpam_calib.errors import InputError
+
+
+@app.command()
+def simulate(
+    specimen: Annotated[Path, typer.Argument(help="specimen folder or its specimen.toml")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="the specimen folder to write")],
+    hide: Annotated[list[str] | None, typer.Option(help="ID or ID=VALUE of an effect to hide")] = None,
+    seed: Annotated[int, typer.Option(help="seed of the noise", min=0)] = 0,
+) -> None:
+    """Write a specimen folder with synthetic recordings of the declared simulation."""
+    from mpam_calib.prediction.simulate import simulate as make
+    from mpam_calib.run.synthetic import write_specimen
+    from mpam_calib.specimen import read
+
+    source = specimen / "specimen.toml" if specimen.is_dir() else specimen
+    if output.resolve() == source.parent.resolve():
+        raise InputError(output, "the specimen's own folder", "another folder")
+    made = make(read(specimen, data_required=False), _sizes(hide or []), seed)
+    write_specimen(made, source, output)
+    print(output / "specimen.toml")
+
+
+def _sizes(hide: list[str]) -> dict[str, float | None]:
+    """Effect ids and their sizes in lab units."""
+    sizes: dict[str, float | None] = {}
+    for text in hide:
+        identifier, equals, number = text.partition("=")
+        try:
+            sizes[identifier] = float(number) if equals else None
+        except ValueError as error:
+            raise InputError("--hide", f'"{text}"', "ID or ID=NUMBER") from error
+    return sizes

@@ -1,0 +1,187 @@
+"""Synthetic recordings: the declared simulation at its mode, with effects hidden in it on request."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.errors import InputError
+from mpam_calib.model.blueprint import Blueprint, draw_blueprint
+from mpam_calib.model.effect import effect, known_effects
+from mpam_calib.model.model import Model, build_model
+from mpam_calib.model.noise import CORRELATED, TIME, WHITE
+from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.bins import row_readings
+from mpam_calib.posterior.target import build_target, locate
+from mpam_calib.prediction.curves import contraction_grid, first_root
+from mpam_calib.prediction.protocol import LEVELS, thesis_protocol
+from mpam_calib.specimen.recording import ForceMap, Loops, Specimen
+from mpam_calib.units import si_factor
+
+Array = NDArray[np.float64]
+
+THESIS_FRICTION = {"K_f": 0.0787, "f_s": 0.15}
+"""Friction of a specimen without data: mean of thesis Table 4.10; the text to Fig. 4.20."""
+THESIS_FORCE_SD = 0.25
+"""N; 0.1 % of the thesis's 250 N load cell."""
+TYPICAL = 1.0
+"""Standard normal image of a hidden effect's default size: a large but ordinary draw of its prior."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Synthetic recordings and the truth behind them (lab units)."""
+
+    specimen: Specimen
+    hidden: dict[str, dict[str, float]]
+    parameters: dict[str, float]
+
+
+def simulate(specimen: Specimen, hide: dict[str, float | None], seed: int) -> Simulated:
+    """Synthetic recordings of a specimen.
+
+    With data: the mode fitted to them, at their rows. Without: the declared ``E_Pa`` and the thesis's
+    protocol. ``hide`` maps effect ids to a size in lab units (None: a typical one). Raises
+    ``InputError`` for an id that is unknown, has no size to hide, or lacks what it needs.
+    """
+    rng = np.random.default_rng([seed, 8])
+    fitted = specimen.has_muscle_data
+    if not fitted and (specimen.geometry is None or specimen.simulation.E_Pa is None):
+        raise InputError(
+            specimen.folder / "specimen.toml", "neither data nor E_Pa", "one of them, to simulate from"
+        )
+    if fitted:
+        blueprint = draw_blueprint(specimen)
+        target, modes = locate(build_target(specimen, blueprint), rng)
+        values = {k: v.copy() for k, v in target.model.values(modes[0].u[None]).items()}
+        eta = target.linear_mean(values)
+    else:
+        specimen = replace(specimen, levels_Pa=LEVELS)
+        blueprint = draw_blueprint(specimen)
+        model = build_model(blueprint)
+        values = _without_data(model)
+        eta = np.zeros((1, sum(model.linear_sizes)))
+    model, hidden = _with_hidden(blueprint, values, hide, specimen)
+    assert model.chain is not None
+    eta = eta[:, : model.linear_sizes[0]]
+    loops, grid = specimen.loops, specimen.force_map
+    if not fitted:
+        loops = _protocol(model, values, eta)
+    if loops is not None:
+        force = model.chain.force(values, eta, row_readings(loops))[0]
+        loops = _record(loops, force, values, specimen.sensors.force_floor_N, rng)
+    if grid is not None:
+        grid = _record_map(model, grid, values, eta, specimen, rng)
+    result = replace(
+        specimen,
+        loops=loops,
+        force_map=grid,
+        blocked_force=None,
+        free_contraction=None,
+        tensile=specimen.tensile,
+    )
+    shown = {name: float(v[0, 0] / si_factor(name)) for name, v in values.items()}
+    return Simulated(result, hidden, shown)
+
+
+def _without_data(model: Model) -> dict[str, Array]:
+    """Every prior's centre, the thesis's friction and its load cell's noise."""
+    values = model.values(np.zeros((1, len(model.names))))
+    for name in values:
+        stem = name.split("@")[0]
+        if stem in THESIS_FRICTION:
+            values[name] = np.full((1, 1), THESIS_FRICTION[stem])
+    assert model.setting is not None
+    values[WHITE] = np.full((1, 1), model.setting.force_sd or THESIS_FORCE_SD)
+    return values
+
+
+def _with_hidden(
+    blueprint: Blueprint, values: dict[str, Array], hide: dict[str, float | None], specimen: Specimen
+) -> tuple[Model, dict[str, dict[str, float]]]:
+    """The model with the hidden effects, their sizes put among the values."""
+    place = "--hide"
+    hidden: dict[str, dict[str, float]] = {}
+    for identifier, size in hide.items():
+        if identifier not in known_effects():
+            raise InputError(place, f'"{identifier}"', "one of " + ", ".join(known_effects()))
+        item = effect(identifier)
+        if item.needs_braid and specimen.braid is None:
+            raise InputError(place, f"{identifier} without [braid]", "the strands' values in specimen.toml")
+        if identifier in blueprint.simulation.effects:
+            raise InputError(place, f'"{identifier}"', "an effect that the simulation does not declare")
+        simulation = blueprint.simulation
+        effects = (*simulation.effects, identifier)
+        blueprint = blueprint.model_copy(
+            update={"simulation": simulation.model_copy(update={"effects": effects})}
+        )
+        setting = blueprint.setting()
+        assert setting is not None
+        parameters = item.parameters(setting)
+        if size is not None and len(parameters) != 1:
+            raise InputError(place, f"{identifier}={size:g}", f"no value: {identifier} has no single size")
+        hidden[identifier] = {}
+        for parameter in parameters:
+            factor = si_factor(parameter.name)
+            value = float(parameter.prior.from_normal(np.array(TYPICAL))) if size is None else size * factor
+            if parameter.name in values:
+                raise InputError(place, f'"{identifier}"', f"an effect without the declared {parameter.name}")
+            values[parameter.name] = np.full((1, 1), value)
+            hidden[identifier][parameter.name] = value / factor
+    return build_model(blueprint), hidden
+
+
+def _protocol(model: Model, values: dict[str, Array], eta: Array) -> Loops:
+    assert model.chain is not None and model.setting is not None
+    L0 = model.setting.geometry.L0
+    grid = contraction_grid(model, 0.0)
+    free = []
+    for level in LEVELS:
+        readings = Readings.at_rest(np.full(len(grid), level), grid * L0)
+        free.append(float(first_root(grid, model.chain.force(values, eta, readings))[0]))
+    return thesis_protocol(np.array(free), L0)
+
+
+def _noise(count: int, dt: float, values: dict[str, Array], rng: np.random.Generator) -> Array:
+    """White noise and an AR(1) part, N."""
+    noise = values[WHITE][0, 0] * rng.standard_normal(count)
+    if CORRELATED in values:
+        from scipy.signal import lfilter
+
+        rho = float(np.exp(-dt / values[TIME][0, 0]))
+        shocks = rng.standard_normal(count) * np.sqrt(1.0 - rho**2)
+        shocks[0] = rng.standard_normal()
+        noise = noise + values[CORRELATED][0, 0] * lfilter([1.0], [1.0, -rho], shocks)
+    return np.asarray(noise)
+
+
+def _record(
+    loops: Loops, force: Array, values: dict[str, Array], floor: float | None, rng: np.random.Generator
+) -> Loops:
+    dt = float(np.median(np.diff(loops.time_s)))
+    held = force if floor is None else np.maximum(force, floor)
+    reading = held + _noise(len(force), dt, values, rng)
+    censored = np.zeros(len(force), dtype=bool) if floor is None else reading <= floor
+    return replace(loops, force_N=reading, censored=censored)
+
+
+def _record_map(
+    model: Model,
+    grid: ForceMap,
+    values: dict[str, Array],
+    eta: Array,
+    specimen: Specimen,
+    rng: np.random.Generator,
+) -> ForceMap:
+    assert model.chain is not None and specimen.geometry is not None
+    sign = np.where(np.abs(grid.branch) == 1, grid.branch, 0).astype(np.float64)
+    readings = Readings.at_rest(grid.pressure_Pa, grid.contraction * specimen.geometry.L0, sign)
+    readings = replace(readings, level=grid.level)
+    force = model.chain.force(values, eta, readings)[0]
+    floor = specimen.sensors.force_floor_N
+    slack = np.zeros(len(force), dtype=bool) if floor is None else force <= floor
+    held = force if floor is None else np.maximum(force, floor)
+    reading = held + values[WHITE][0, 0] * rng.standard_normal(len(force))
+    return replace(grid, force_N=np.where(slack, held, reading), censored=slack)

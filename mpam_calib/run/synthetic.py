@@ -1,0 +1,72 @@
+"""Writing synthetic recordings as a specimen folder that calls itself synthetic."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import tomlkit
+
+from mpam_calib.posterior.checkpoint import write_atomically
+from mpam_calib.prediction.simulate import Simulated
+from mpam_calib.run.files import write_csv, write_json
+from mpam_calib.specimen.recording import BRANCH_WORDS, ForceMap, Loops
+from mpam_calib.units import KPA, MM
+
+WORDS = {code: word for word, code in BRANCH_WORDS.items()}
+LOOPS, FORCE_MAP = "loops_synthetic.csv", "force_map_synthetic.csv"
+
+
+def write_specimen(simulated: Simulated, source: Path, folder: Path) -> None:
+    """Write specimen.toml (the source's, with new files), the synthetic CSV files and truth.json."""
+    document = tomlkit.parse(source.read_text(encoding="utf-8-sig"))
+    identity = document["specimen"]
+    assert isinstance(identity, tomlkit.items.Table)
+    name = str(identity["name"])
+    identity["name"] = name if name.endswith("(synthetic)") else f"{name} (synthetic)"
+    for table in ("files", "columns", "csv"):
+        document.pop(table, None)
+    files = tomlkit.table()
+    specimen = simulated.specimen
+    if specimen.loops is not None:
+        files["loops"] = LOOPS
+        write_csv(_loops_table(specimen.loops, specimen.levels_Pa), folder / LOOPS)
+    if specimen.force_map is not None:
+        files["force_map"] = FORCE_MAP
+        write_csv(_map_table(specimen.force_map), folder / FORCE_MAP)
+    if specimen.tensile is not None:
+        files["tensile"] = "tensile.csv"
+        tensile = pd.DataFrame({"strain": specimen.tensile.strain, "stress_Pa": specimen.tensile.stress_Pa})
+        write_csv(tensile, folder / "tensile.csv")
+    document["files"] = files
+    text = "# SYNTHETIC: made by a simulation, not by a rig.\n" + tomlkit.dumps(document)
+    write_atomically(folder / "specimen.toml", lambda p: p.write_text(text, encoding="utf-8"))
+    truth = {"hidden": simulated.hidden, "parameters": simulated.parameters}
+    write_json(truth, folder / "truth.json")
+
+
+def _loops_table(loops: Loops, levels: np.ndarray) -> pd.DataFrame:
+    return pd.DataFrame(
+        {
+            "time_s": np.round(loops.time_s, 6),
+            "pressure_kPa": loops.pressure_Pa / KPA,
+            "displacement_mm": loops.displacement_m / MM,
+            "force_N": loops.force_N,
+            "setpoint_kPa": np.round(levels[loops.level] / KPA, 3),
+            "cycle": loops.cycle,
+            "branch": pd.Series(loops.branch).map(WORDS).to_numpy(),
+        }
+    )
+
+
+def _map_table(grid: ForceMap) -> pd.DataFrame:
+    return pd.DataFrame(
+        {
+            "pressure_kPa": grid.pressure_Pa / KPA,
+            "contraction": grid.contraction,
+            "force_N": grid.force_N,
+            "branch": pd.Series(grid.branch).map(WORDS).to_numpy(),
+            "censored": grid.censored.astype(int),
+        }
+    )
