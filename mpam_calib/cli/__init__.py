@@ -66,7 +66,7 @@ def _run() -> int:
         app(["--help"], standalone_mode=False)
         return _refused("command line: found no command, expected one of those above")
     try:
-        return int(app(standalone_mode=False) or DONE)
+        code = int(app(standalone_mode=False) or DONE)
     except typer.Abort as error:
         raise Interrupted from error
     except Exception as error:
@@ -75,6 +75,10 @@ def _run() -> int:
         if message is None:
             raise
         return _refused(" ".join(str(message()).split()))
+    if code == INTERRUPTED:
+        # The parser has swallowed Ctrl-C.
+        raise Interrupted
+    return code
 
 
 def _refused(message: str) -> int:

@@ -1,0 +1,113 @@
+"""Killed and interrupted runs: nothing is lost, nothing is left running, the result is the same."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from .command import PATIENCE, Result, all_gone, contents, finish, kill, living, run, start, wait_for
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="signals and /proc as Linux has them")
+
+MANY_BLOCKS = ("--no-correlated-noise", "--no-remainder", "--ess", 1e6, "--max-steps", 200)
+"""Five blocks: they stop at the budget, so that every run has as many."""
+TABLES = ("summary.csv", "bands.csv", "run.json")
+
+
+@pytest.fixture(scope="module")
+def unbroken(muscle: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, bytes], float]:
+    """What an uninterrupted run leaves, and the seconds that it took."""
+    folder = tmp_path_factory.mktemp("unbroken") / "run"
+    begin = time.monotonic()
+    assert run("calibrate", muscle, "-o", folder, *MANY_BLOCKS).code == 3
+    return contents(folder), time.monotonic() - begin
+
+
+def resume(muscle: Path, folder: Path, whole: dict[str, bytes]) -> None:
+    """Finish a broken run and compare it with the uninterrupted one."""
+    result = run("calibrate", muscle, "-o", folder, *MANY_BLOCKS)
+    assert (result.code, result.err) == (3, "")
+    after = contents(folder)
+    assert set(after) == set(whole)
+    for name in TABLES:
+        assert after[name] == whole[name], name
+
+
+@pytest.mark.parametrize("moment", ["warm_up", "block_00002"])
+def test_a_killed_run_is_resumed(
+    moment: str, muscle: Path, tmp_path: Path, unbroken: tuple[dict[str, bytes], float]
+) -> None:
+    whole, seconds = unbroken
+    folder = tmp_path / "run"
+    process = start("calibrate", muscle, "-o", folder, *MANY_BLOCKS)
+    part = folder / "checkpoint" / f"{moment}.checkpoint"
+    assert wait_for(process, part)
+    time.sleep(0.05 * seconds * random.random())
+    kill(process)
+    assert all_gone(process.pid)
+    written = part.stat().st_mtime_ns
+    resume(muscle, folder, whole)
+    # Gone on with, not drawn anew.
+    assert part.stat().st_mtime_ns == written
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("number", range(10))
+def test_a_run_killed_at_any_moment_is_resumed(
+    number: int, muscle: Path, tmp_path: Path, unbroken: tuple[dict[str, bytes], float]
+) -> None:
+    whole, seconds = unbroken
+    folder = tmp_path / "run"
+    process = start("calibrate", muscle, "-o", folder, *MANY_BLOCKS)
+    time.sleep(seconds * random.uniform(0.1, 1.1))
+    kill(process)
+    assert all_gone(process.pid)
+    resume(muscle, folder, whole)
+
+
+def test_ctrl_c_says_one_line_and_can_be_resumed(
+    muscle: Path, tmp_path: Path, unbroken: tuple[dict[str, bytes], float]
+) -> None:
+    folder = tmp_path / "run"
+    process = start("calibrate", muscle, "-o", folder, *MANY_BLOCKS)
+    assert wait_for(process, folder / "checkpoint" / "block_00000.checkpoint")
+    assert len(living(process.pid)) > 1
+    # As a terminal does: to the workers as well.
+    os.killpg(process.pid, signal.SIGINT)
+    result = finish(process)
+    assert result.code == 130
+    assert result.complaint.startswith("interrupted")
+    assert all_gone(process.pid)
+    assert not (folder / "run.json").exists()
+    resume(muscle, folder, unbroken[0])
+
+
+@pytest.mark.parametrize("delay", [0.4, 1.5])
+def test_ctrl_c_at_an_early_moment_says_one_line(delay: float, muscle: Path, tmp_path: Path) -> None:
+    result = _interrupt(muscle, tmp_path / "run", delay)
+    assert result.code == 130, result
+    assert result.complaint.startswith("interrupted")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("number", range(20))
+def test_ctrl_c_at_any_moment_says_one_line(number: int, muscle: Path, tmp_path: Path) -> None:
+    result = _interrupt(muscle, tmp_path / "run", random.uniform(0.3, 6.0))
+    assert result.code in (130, 3), result
+    if result.code == 130:
+        assert result.complaint.startswith("interrupted")
+
+
+def _interrupt(muscle: Path, folder: Path, delay: float) -> Result:
+    process = start("calibrate", muscle, "-o", folder, *MANY_BLOCKS)
+    time.sleep(delay)
+    os.killpg(process.pid, signal.SIGINT)
+    result = finish(process)
+    assert all_gone(process.pid, PATIENCE)
+    return result

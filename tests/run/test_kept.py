@@ -1,0 +1,168 @@
+"""An existing RUN: kept, replaced, gone on with, left alone."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from .command import FAST, RESULTS, Here, contents, stamps
+from .small import loops_text, tensile_text
+
+SPOIL: dict[str, Callable[[bytes], bytes]] = {
+    "modes": lambda part: b"\x80\x05.",
+    "warm_up": lambda part: b"",
+    "block_00000": lambda part: part[: len(part) // 2],
+    "block_00001": lambda part: part[:-100] + bytes([part[-100] ^ 1]) + part[-99:],
+}
+
+
+def state(run: Path) -> dict[str, object]:
+    content: dict[str, object] = json.loads((run / "run.json").read_text())
+    return content
+
+
+@pytest.fixture
+def own_material(material: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(material, tmp_path / "own"))
+
+
+@pytest.fixture
+def own_run(material_run: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(material_run, tmp_path / "own_run"))
+
+
+def test_a_finished_run_holds_its_files_and_no_others(muscle_run: Path) -> None:
+    assert set(contents(muscle_run)) == set(RESULTS)
+
+
+def test_a_finished_run_is_kept(own_material: Path, own_run: Path, here: Here) -> None:
+    before = stamps(own_run)
+    result = here("calibrate", own_material, "-o", own_run)
+    assert result.code == 0
+    assert "kept" in result.out
+    assert stamps(own_run) == before
+
+
+def test_a_smaller_budget_keeps_what_has_converged(own_material: Path, own_run: Path, here: Here) -> None:
+    before = stamps(own_run)
+    assert here("calibrate", own_material, "-o", own_run, "--max-steps", 1).code == 0
+    assert stamps(own_run) == before
+
+
+@pytest.mark.parametrize("change", ["seed", "data", "model"])
+def test_another_digest_replaces(change: str, own_material: Path, own_run: Path, here: Here) -> None:
+    before = contents(own_run)
+    (own_run / "predictions.csv").write_text("of the run before\n")
+    options: list[object] = []
+    if change == "seed":
+        options = ["--seed", 1]
+    elif change == "data":
+        (own_material / "tensile.csv").write_text(tensile_text(seed=5))
+    else:
+        declaration = own_material / "specimen.toml"
+        declaration.write_text(declaration.read_text().replace("order = 2", "order = 3"))
+    result = here("calibrate", own_material, "-o", own_run, *options)
+    assert result.code == 0
+    after = contents(own_run)
+    assert set(after) == set(RESULTS)
+    for name in ("summary.csv", "bands.csv", "run.json"):
+        assert after[name] != before[name]
+
+
+def test_a_lost_file_is_made_again(own_material: Path, own_run: Path, here: Here) -> None:
+    before = contents(own_run)
+    (own_run / "bands.csv").unlink()
+    assert here("calibrate", own_material, "-o", own_run).code == 0
+    after = contents(own_run)
+    assert after["bands.csv"] == before["bands.csv"]
+
+
+def test_a_small_budget_exits_3_and_a_larger_one_goes_on(
+    own_material: Path, tmp_path: Path, here: Here
+) -> None:
+    run, other = tmp_path / "run", tmp_path / "other"
+    much = ("--ess", 1e6)
+    result = here("calibrate", own_material, "-o", run, *much, "--max-steps", 40)
+    assert result.code == 3
+    assert state(run)["converged"] is False
+    assert set(RESULTS) <= set(contents(run))
+    assert "--max-steps" in result.out
+    first = stamps(run / "checkpoint")
+    assert "block_00000.checkpoint" in first and "block_00001.checkpoint" not in first
+
+    # The same budget has nothing to add.
+    before = stamps(run)
+    assert here("calibrate", own_material, "-o", run, *much, "--max-steps", 40).code == 3
+    assert stamps(run) == before
+
+    (run / "predictions.csv").write_text("of the shorter run\n")
+    assert here("calibrate", own_material, "-o", run, *much, "--max-steps", 80).code == 3
+    after = stamps(run / "checkpoint")
+    assert "block_00001.checkpoint" in after
+    assert {name: after[name] for name in first} == first
+    assert not (run / "predictions.csv").exists()
+
+    # Byte for byte what one run with the larger budget draws, parts that were damaged meanwhile included.
+    longer = contents(run)
+    (run / "run.json").unlink()
+    for name, spoil in SPOIL.items():
+        part = run / "checkpoint" / f"{name}.checkpoint"
+        part.write_bytes(spoil(part.read_bytes()))
+    for again in (run, other):
+        assert here("calibrate", own_material, "-o", again, *much, "--max-steps", 80).code == 3
+        for name in ("summary.csv", "bands.csv", "run.json"):
+            assert (again / name).read_bytes() == longer[name]
+
+
+def test_bad_input_leaves_an_existing_run_alone(
+    muscle: Path, run_copy: Path, tmp_path: Path, here: Here
+) -> None:
+    spoilt = Path(shutil.copytree(muscle, tmp_path / "spoilt"))
+    lines = loops_text().splitlines()
+    lines[7] = lines[7].replace(",", ",x", 1)
+    (spoilt / "loops.csv").write_text("\n".join(lines) + "\n")
+    before = stamps(run_copy)
+    result = here("calibrate", spoilt, "-o", run_copy, *FAST)
+    assert result.code == 2
+    assert result.complaint.startswith(f"error: {spoilt / 'loops.csv'}:8:pressure_kPa: found ")
+    assert stamps(run_copy) == before
+    fresh = tmp_path / "deep" / "fresh"
+    assert here("calibrate", spoilt, "-o", fresh, *FAST).code == 2
+    assert not fresh.parent.exists()
+
+
+def test_too_little_data_for_the_model_writes_nothing(muscle: Path, tmp_path: Path, here: Here) -> None:
+    few = Path(shutil.copytree(muscle, tmp_path / "few"))
+    (few / "loops.csv").write_text(loops_text(levels=(150.0,)))
+    result = here("calibrate", few, "-o", tmp_path / "fresh", *FAST)
+    assert result.code == 2
+    assert result.complaint.startswith("error: ")
+    assert not (tmp_path / "fresh").exists()
+
+
+def test_an_output_that_cannot_be_a_folder_is_refused(muscle: Path, tmp_path: Path, here: Here) -> None:
+    file = tmp_path / "file"
+    file.write_text("mine")
+    for output in (file, file / "run"):
+        result = here("calibrate", muscle, "-o", output, *FAST)
+        assert result.code == 2
+        assert result.complaint.startswith(f"error: {file}: found a file, expected a folder")
+    assert file.read_text() == "mine"
+
+
+@pytest.mark.parametrize("target", ["nothing", "small"])
+def test_moduli_of_a_run_that_is_none_are_refused(
+    target: str, muscle: Path, tmp_path: Path, here: Here
+) -> None:
+    specimen = Path(shutil.copytree(muscle, tmp_path / "small"))
+    declaration = specimen / "specimen.toml"
+    text = declaration.read_text().replace('moduli = "loops"', f'moduli = "run:../{target}"')
+    declaration.write_text(text.replace('law = "linear"', 'law = "constant"'))
+    result = here("calibrate", specimen, "-o", tmp_path / "fresh")
+    assert result.code == 2
+    assert target in result.complaint and "a finished run" in result.complaint
+    assert not (tmp_path / "fresh").exists()
