@@ -1,0 +1,93 @@
+"""Diagnostics on series whose effective size is known, and on ensembles that disagree."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mpam_calib.posterior.convergence import RHAT_LIMIT, diagnose_chains
+
+SHAPE = (4, 1500, 16)
+
+
+def ar1(rho: float, seed: int, shape: tuple[int, int, int] = SHAPE) -> np.ndarray:
+    """Stationary AR(1) along the steps, unit variance, walkers independent: τ = (1 + ρ)/(1 − ρ)."""
+    rng = np.random.default_rng(seed)
+    z = rng.standard_normal(shape)
+    x = np.empty(shape)
+    x[:, 0] = z[:, 0]
+    for t in range(1, shape[1]):
+        x[:, t] = rho * x[:, t - 1] + np.sqrt(1.0 - rho**2) * z[:, t]
+    return x[..., None]
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.8, 0.95])
+def test_ess_of_a_series_of_known_tau(rho):
+    found = diagnose_chains(ar1(rho, 1))
+    expected = np.prod(SHAPE) * (1.0 - rho) / (1.0 + rho)
+    assert found.ess_bulk[0] == pytest.approx(expected, rel=0.2)
+    assert found.rhat[0] <= RHAT_LIMIT
+
+
+@pytest.mark.parametrize("rho", [0.5, 0.95])
+def test_the_mean_s_error_is_what_ess_promises(rho):
+    """Forty series: the means scatter as 1/√ESS says."""
+    shape = (4, 500, 8)
+    runs = [ar1(rho, seed, shape) for seed in range(40)]
+    ess = np.mean([diagnose_chains(x).ess_bulk[0] for x in runs[:5]])
+    scatter = np.var([x.mean() for x in runs])
+    # A variance of 40 has a relative sd of √(2/39) = 0.23; ESS itself may be 20 % off.
+    assert scatter * ess == pytest.approx(1.0, abs=0.2 + 3.0 * 0.23)
+
+
+def test_ess_is_never_flattered_by_anticorrelation():
+    assert diagnose_chains(ar1(-0.5, 2)).ess_bulk[0] <= np.prod(SHAPE)
+
+
+def test_tail_ess_sees_tails_that_do_not_mix():
+    """The sign of a series flips freely, its size hardly: the bulk is fine, the tails are not."""
+    size = np.exp(1.5 * ar1(0.995, 3))
+    sign = np.random.default_rng(0).choice([-1.0, 1.0], size=size.shape)
+    found = diagnose_chains(sign * size)
+    assert found.ess_tail[0] < 0.05 * np.prod(SHAPE)
+
+
+def test_rhat_is_quiet_on_independent_draws():
+    fired = [
+        np.any(diagnose_chains(np.random.default_rng(s).standard_normal((4, 200, 8, 5))).rhat > RHAT_LIMIT)
+        for s in range(10)
+    ]
+    assert not any(fired)
+
+
+def test_rhat_fires_where_one_ensemble_sits_elsewhere():
+    x = ar1(0.5, 4)
+    x[2] += 1.0
+    assert diagnose_chains(x).rhat[0] > 1.05
+
+
+def test_rhat_fires_where_one_ensemble_is_wider():
+    x = ar1(0.5, 5)
+    x[1] *= 2.0
+    assert diagnose_chains(x).rhat[0] > 1.02
+
+
+def test_walkers_that_agree_inside_their_ensemble_do_not_hide_that_ensembles_differ():
+    """Every walker mixes within its ensemble's own mode: R-hat over walkers would see 64 good chains."""
+    x = 0.3 * ar1(0.3, 6)
+    x += np.array([-1.0, -0.4, 0.4, 1.0])[:, None, None, None]
+    found = diagnose_chains(x)
+    assert found.rhat[0] > 1.5
+    assert not found.converged
+
+
+def test_an_ensemble_that_drifts_has_not_converged():
+    x = ar1(0.5, 7) + np.linspace(0.0, 3.0, SHAPE[1])[None, :, None, None]
+    found = diagnose_chains(x)
+    assert not found.converged or found.ess_bulk[0] < 0.01 * np.prod(SHAPE)
+
+
+def test_each_parameter_has_its_own_figures():
+    x = np.concatenate([ar1(0.0, 8), ar1(0.95, 9)], axis=-1)
+    found = diagnose_chains(x)
+    assert found.ess_bulk[0] > 10.0 * found.ess_bulk[1]
