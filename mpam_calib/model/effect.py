@@ -14,6 +14,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from mpam_calib.model.effect_ids import add_effect_id, load_outside_effects
 from mpam_calib.model.priors import Parameter
 from mpam_calib.model.state import Setting, State
 
@@ -58,10 +59,11 @@ _REGISTRY: dict[str, Effect] = {}
 
 
 def register(effect: Effect) -> Effect:
-    """Make an effect known under its id; raises ValueError where the id is taken."""
+    """Make an effect known under its id, to specimen files too; raises ValueError where the id is taken."""
     if effect.id in _REGISTRY:
         raise ValueError(f"an effect with the id {effect.id!r} is registered already")
     _REGISTRY[effect.id] = effect
+    add_effect_id(effect.id)
     return effect
 
 
@@ -79,3 +81,5 @@ def known_effects() -> tuple[str, ...]:
 
 def _load_catalogue() -> None:
     import mpam_calib.model.catalogue  # noqa: F401
+
+    load_outside_effects()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.metadata import entry_points
 from typing import Final
 
 EFFECT_IDS: Final[tuple[str, ...]] = (
@@ -26,15 +27,28 @@ EFFECT_IDS: Final[tuple[str, ...]] = (
 )
 """Ids of the effects that ship with the package."""
 
+OUTSIDE: Final = "mpam_calib.effects"
+"""Entry-point group under which another package names a module that registers effects on import."""
+
 _added: list[str] = []
+_asked: list[str] = []
 
 
 def add_effect_id(effect_id: str) -> None:
     """Let specimen files declare ``effect_id`` too: for an effect that is registered from outside."""
-    if effect_id not in known_effect_ids():
+    if effect_id not in (*EFFECT_IDS, *_added):
         _added.append(effect_id)
+
+
+def load_outside_effects() -> None:
+    """Import, once, the modules that installed packages name under ``OUTSIDE``."""
+    if not _asked:
+        _asked.append(OUTSIDE)
+        for point in entry_points(group=OUTSIDE):
+            point.load()
 
 
 def known_effect_ids() -> tuple[str, ...]:
     """Every id that ``[simulation] effects`` may hold now: those of the package, then those added."""
+    load_outside_effects()
     return (*EFFECT_IDS, *_added)
