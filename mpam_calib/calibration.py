@@ -93,9 +93,14 @@ def calibrate(
 ) -> Calibration:
     """Draw the posterior of a specimen's declared simulation.
 
+    ``material`` is what ``moduli = "run:..."`` names; it is read from there where it is not given.
     Raises ``InputError`` where the specimen cannot carry the model. See ``Calibration.converged`` for
     whether the draws can be used.
     """
+    if material is None:
+        from mpam_calib.run.calibrate import resolve_material  # that module builds on this one
+
+        material = resolve_material(specimen)
     target = build_target(specimen, draw_blueprint(specimen, options, material))
     found: tuple[Guide, list[Mode]] | None = checkpoint.load("modes") if checkpoint else None
     if found is None:

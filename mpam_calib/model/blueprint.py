@@ -90,6 +90,8 @@ def draw_blueprint(
     specimen: Specimen, options: Options | None = None, material: MaterialPosterior | None = None
 ) -> Blueprint:
     """The blueprint of a specimen; ``material`` is what ``moduli = "run:..."`` names, already read."""
+    if material is None and specimen.simulation.moduli.startswith("run:"):
+        raise ValueError(f"the material of moduli = {specimen.simulation.moduli!r} was not handed over")
     loops = specimen.loops
     reach = _reach(specimen)
     stroke = float(reach.max(initial=0.0)) * (specimen.geometry.L0 if specimen.geometry else 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,7 +40,7 @@ class Simulated:
     parameters: dict[str, float]
 
 
-def simulate(specimen: Specimen, hide: dict[str, float | None], seed: int) -> Simulated:
+def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None, seed: int = 0) -> Simulated:
     """Synthetic recordings of a specimen.
 
     With data: the mode fitted to them, at their rows. Without: the declared ``E_Pa`` and the thesis's
@@ -53,7 +54,9 @@ def simulate(specimen: Specimen, hide: dict[str, float | None], seed: int) -> Si
             specimen.folder / "specimen.toml", "neither data nor E_Pa", "one of them, to simulate from"
         )
     if fitted:
-        blueprint = draw_blueprint(specimen)
+        from mpam_calib.run.calibrate import resolve_material  # that module builds on this package
+
+        blueprint = draw_blueprint(specimen, material=resolve_material(specimen))
         target, modes = locate(build_target(specimen, blueprint), rng)
         values = {k: v.copy() for k, v in target.model.values(modes[0].u[None]).items()}
         eta = target.linear_mean(values)
@@ -63,7 +66,7 @@ def simulate(specimen: Specimen, hide: dict[str, float | None], seed: int) -> Si
         model = build_model(blueprint)
         values = _without_data(model)
         eta = np.zeros((1, sum(model.linear_sizes)))
-    model, hidden = _with_hidden(blueprint, values, hide, specimen)
+    model, hidden = _with_hidden(blueprint, values, hide or {}, specimen)
     assert model.chain is not None
     eta = eta[:, : model.linear_sizes[0]]
     loops, grid = specimen.loops, specimen.force_map
@@ -99,7 +102,7 @@ def _without_data(model: Model) -> dict[str, Array]:
 
 
 def _with_hidden(
-    blueprint: Blueprint, values: dict[str, Array], hide: dict[str, float | None], specimen: Specimen
+    blueprint: Blueprint, values: dict[str, Array], hide: Mapping[str, float | None], specimen: Specimen
 ) -> tuple[Model, dict[str, dict[str, float]]]:
     """The model with the hidden effects, their sizes put among the values."""
     place = "--hide"
