@@ -30,7 +30,9 @@ COVERAGE_MIN_ROWS: Final = 20
 UNIDENTIFIED: Final = 0.20
 """A posterior that is narrower than its prior by less than this share learnt nothing."""
 GAUGE_SHARE: Final = 0.5
-"""The gauge limits the result when it makes up this share of the band."""
+"""The gauge limits the result when it makes up this share of the band ..."""
+GAUGE_TAKEN_UP: Final = 2.0
+"""... and where it would make up this many of the band, free parameters have taken up its offset."""
 Z90: Final = 1.6449
 """sigmas in half a central 90 % interval"""
 
@@ -85,7 +87,7 @@ def remainder(view: CalibrationView) -> Limit | None:
     sentence = (
         f"The simulation is wrong by about {size} (root mean square, {100 * share:.1f} % of the largest "
         f"{largest}; sensor noise: {significant(view.noise, 2)} {unit}). "
-        "The bands include this. `diagnose` looks for the cause."
+        "The bands include this. The command diagnose looks for the cause."
     )
     level: Level = "good" if share <= REMAINDER_CAUTION else "caution" if share <= REMAINDER_BAD else "bad"
     return Limit(level, sentence, f"the simulation is wrong by about {size}")
@@ -122,7 +124,8 @@ def extrapolation(view: CalibrationView) -> Limit | None:
         f"No reading comes near the {' or the '.join(names)} at {view.top_level_kPa:g} kPa: "
         "the simulation carries the number there, not the data."
     )
-    return Limit("caution", sentence, f"the {' and the '.join(names)} are extrapolated")
+    verb = "is" if len(names) == 1 else "are"
+    return Limit("caution", sentence, f"the {' and the '.join(names)} {verb} extrapolated")
 
 
 def coverage(view: CalibrationView) -> Limit | None:
@@ -150,6 +153,13 @@ def gauge(view: CalibrationView) -> Limit | None:
     half = float(row["q95"] - row["q05"]) / 2.0
     if newtons < GAUGE_SHARE * half or half <= 0:
         return None
+    if newtons > GAUGE_TAKEN_UP * half:
+        sentence = (
+            "The bands hold for pressures as this gauge reads them, because the free parameters take up its "
+            f"offset. By another gauge, ± {view.pressure_bias_sd_kPa:g} kPa (one sigma) more is worth "
+            f"± {significant(newtons, 2)} N (90 %)."
+        )
+        return Limit("good", sentence, "the bands hold for pressures as this gauge reads them")
     sentence = (
         f"The pressure gauge sets the width of the band: ± {view.pressure_bias_sd_kPa:g} kPa (one sigma) "
         f"alone is worth ± {significant(newtons, 2)} N (90 %). More loops do not help; a better gauge does."

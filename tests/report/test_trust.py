@@ -137,6 +137,9 @@ def test_a_gauge_that_makes_up_the_band_is_named(sound: CalibrationView) -> None
     # 22.5 kPa at 0.39 N/kPa, 90 %: 14 N
     assert "± 14 N" in limit.sentence
     assert limit.level == "good"
+    assert "as this gauge reads them" in limit.sentence  # the band is far narrower: it cannot be what sets it
+    limit = trust.gauge(replace(sound, pressure_bias_sd_kPa=5.0))
+    assert limit is not None and "sets the width" in limit.sentence
 
 
 def test_reconstructed_data_are_a_caution(sound: CalibrationView) -> None:
