@@ -113,14 +113,20 @@ def test_festo_maps_are_whole(folder: str, rows: int, censored: int) -> None:
 
 
 def test_the_cylinder_takes_the_higher_force_on_loading() -> None:
-    files = sorted((DATASETS / "cylinder_zillen").glob("loops_*.csv"))
-    frames = [pd.read_csv(path) for path in files]
-    assert sum(map(len, frames)) == 9307
-    for data in frames:
+    folder = DATASETS / "cylinder_zillen"
+    rows = 0
+    for bar in range(1, 8):
+        early, later = (pd.read_csv(folder / f"{kind}_{bar}bar.csv") for kind in ("loops", "later"))
+        data = pd.concat([early, later])
+        rows += len(data)
         assert (np.diff(data.time_s) > 0).all()
-        assert data.cycle.max() == 10
+        assert (early.cycle.max(), later.cycle.min(), later.cycle.max()) == (4, 5, 10)
         force = data.groupby("branch").force_N.mean()
         assert force["loading"] > force["unloading"] + 10
+    assert rows == 9307
+    declared = tomllib.loads((folder / "specimen.toml").read_text(encoding="utf-8"))["files"]["loops"]
+    used = sum(len(pd.read_csv(folder / name)) for name in declared)
+    assert f"{used:,}" in (folder / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(("bad", "expected"), [(3, 0), (2, 1), (1, 1), (130, 130)])
