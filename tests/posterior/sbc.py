@@ -1,0 +1,143 @@
+"""Simulation-based calibration: draw the truth from the prior, the data from the model, rank the truth.
+
+If the posterior is right, the truth's rank among its draws is uniform, for every quantity. The ranks'
+ECDF must stay inside a band that holds simultaneously along the ECDF and over all quantities at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+from model import build
+from scipy import stats
+
+from mpam_calib.model.blueprint import Options, draw_blueprint
+from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.draws import Draws, reported
+from mpam_calib.posterior.sampling import sample
+from mpam_calib.posterior.target import build_target, locate, predict_force
+from mpam_calib.specimen.recording import Specimen
+
+Array = np.ndarray
+L = 99
+"""Draws that the truth is ranked among."""
+PREDICTED = Readings.at_rest(np.array([1.25e5, 1.8e5]), np.array([0.004, 0.009]), np.array([1.0, -1.0]))
+"""Two forces away from the data: between levels, on either branch."""
+
+
+def design(declared: dict, options: Options, rows: int = 12, dt: float = 0.1):
+    """A specimen of three loops with the forces still to come, and its blueprint."""
+    made = build.specimen(declared, build.loops((100.0, 150.0, 200.0), 12.0, rows, dt=dt))
+    made = build.with_force(made, np.full(6 * rows, 20.0))
+    return made, draw_blueprint(made, options)
+
+
+def simulate(made: Specimen, blueprint, rng: np.random.Generator):
+    """Truth (u, η) from the prior and the specimen with its data."""
+    model = build_target(made, blueprint).model
+    u = rng.standard_normal((1, len(model.names)))
+    eta = rng.standard_normal((1, sum(model.linear_sizes)))
+    values = model.values(u)
+    assert made.loops is not None
+    force = predict_force(model, values, eta, build.rows_of(made.loops))[0]
+    n = len(force)
+    noise = values["noise_sd_N"][0, 0] * rng.standard_normal(n)
+    if "noise_corr_sd_N" in values:
+        tau = values["noise_corr_time_s"][0, 0]
+        for stroke in np.unique(made.loops.stroke):
+            rows = np.flatnonzero(made.loops.stroke == stroke)
+            time = made.loops.time_s[rows]
+            cov = np.exp(-np.abs(time[:, None] - time) / tau)
+            root = np.linalg.cholesky(cov + 1e-12 * np.eye(len(rows)))
+            noise[rows] += values["noise_corr_sd_N"][0, 0] * root @ rng.standard_normal(len(rows))
+    return u, eta, build.with_force(made, force + noise)
+
+
+def quantities(model, u: Array, eta: Array) -> tuple[list[str], Array]:
+    """Everything reported, and the two predicted forces: (draws, quantities)."""
+    values = model.values(u)
+    listed = reported(model, Draws(u, values, eta, 1))
+    force = predict_force(model, values, eta, PREDICTED)
+    columns = [item.draws for item in listed] + [force[:, 0], force[:, 1]]
+    return [item.name for item in listed] + ["force, loading", "force, unloading"], np.stack(columns, axis=1)
+
+
+def replicate(
+    declared: dict, options: Options, seed: int, distort: list[Callable[[Array], Array]], **shape: float
+) -> tuple[list[str], Array]:
+    """Ranks (distortions, quantities) of one truth among draws that went through each distortion."""
+    rng = np.random.default_rng([seed, 99])
+    made, blueprint = design(declared, options, **shape)
+    u, eta, made = simulate(made, blueprint, rng)
+    target, modes = locate(build_target(made, blueprint), np.random.default_rng([seed, 0]))
+    chain = sample(target, modes, seed, max_steps=40).chain
+    flat = chain.reshape(-1, chain.shape[-1])
+    drawn_u = flat[rng.permutation(len(flat))[: 10 * L]]
+    values = target.model.values(drawn_u)
+    drawn_eta = np.concatenate(
+        [
+            target.linear_draws({k: v[i : i + 50] for k, v in values.items()}, rng)
+            for i in range(0, 10 * L, 50)
+        ]
+    )
+    names, truth = quantities(target.model, u, eta)
+    _, draws = quantities(target.model, drawn_u, drawn_eta)
+    # The joint distance in normal coordinates: what narrows or shifts all parameters together shows here.
+    joint = np.concatenate([drawn_u, drawn_eta], axis=1)
+    true_joint = np.concatenate([u, eta], axis=1)
+    ranks = []
+    for bend in distort:
+        centre, spread = joint[L:].mean(axis=0), np.cov(joint[L:].T)
+        precision = np.linalg.inv(spread)
+        bent = centre + bend(joint[:L] - centre)
+        distance = [np.einsum("ni,ij,nj->n", x - centre, precision, x - centre) for x in (bent, true_joint)]
+        middle = draws.mean(axis=0)
+        narrowed = middle + bend(draws[:L] - middle)
+        below = (narrowed < truth).sum(axis=0)
+        ranks.append([*below, int((distance[0] < distance[1]).sum())])
+    return [*names, "joint distance"], np.array(ranks)
+
+
+@lru_cache
+def critical(replicates: int, level: float, simulations: int = 40_000) -> float:
+    """Smallest pointwise p-value along an ECDF of uniform ranks that a share ``level`` falls below."""
+    rng = np.random.default_rng(0)
+    lowest = [smallest_p(rng.integers(0, L + 1, replicates), replicates) for _ in range(simulations)]
+    return float(np.quantile(lowest, level))
+
+
+@lru_cache
+def _table(replicates: int) -> Array:
+    """Two-sided binomial p-value of each count at each cut: (L, replicates + 1)."""
+    counts = np.arange(replicates + 1)
+    shares = np.arange(1, L + 1)[:, None] / (L + 1)
+    below = stats.binom.cdf(counts, replicates, shares)
+    above = stats.binom.sf(counts - 1, replicates, shares)
+    return np.minimum(1.0, 2.0 * np.minimum(below, above))
+
+
+def smallest_p(ranks: Array, replicates: int) -> float:
+    """The least likely point of the ranks' ECDF."""
+    cumulated = np.cumsum(np.bincount(ranks, minlength=L + 1))[:L]
+    return float(_table(replicates)[np.arange(L), cumulated].min())
+
+
+def outside(names: list[str], ranks: Array, level: float = 0.01) -> dict[str, float]:
+    """Quantities whose ECDF leaves the band at a family-wise level, with their smallest p-values."""
+    n = len(ranks)
+    limit = critical(n, level / len(names))
+    found = {name: smallest_p(ranks[:, i], n) for i, name in enumerate(names)}
+    return {name: p for name, p in found.items() if p < limit}
+
+
+def run(declared: dict, options: Options, replicates: int, **shape: float) -> tuple[list[str], Array, Array]:
+    """Ranks as they are and of a posterior narrowed by 20 %."""
+    kept, narrow = [], []
+    names: list[str] = []
+    for seed in range(replicates):
+        names, ranks = replicate(declared, options, seed, [lambda x: x, lambda x: 0.8 * x], **shape)
+        kept.append(ranks[0])
+        narrow.append(ranks[1])
+    return names, np.array(kept), np.array(narrow)

@@ -1,0 +1,48 @@
+"""Simulation-based calibration of what calibrate draws (see sbc.py)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from model import build
+
+from mpam_calib.model.blueprint import Options
+
+from . import sbc
+
+LINEAR = {"law": "linear", "order": 2}
+MODELS = {
+    "linear law, Coulomb": (LINEAR, build.PLAIN, {}),
+    "shared-rate exponential": ({"law": "exponential", "order": 2}, build.PLAIN, {}),
+    "strand friction": ({**LINEAR, "friction": "strand"}, build.PLAIN, {}),
+    "correlated noise": (LINEAR, Options(remainder=False), {"rows": 120, "dt": 0.05}),
+}
+
+
+def test_the_band_holds_what_it_promises():
+    """Uniform ranks leave it in 1 % of families; ranks of a narrowed normal nearly always."""
+    rng = np.random.default_rng(1)
+    names = [f"q{i}" for i in range(8)]
+    left = np.mean([bool(sbc.outside(names, rng.integers(0, sbc.L + 1, (60, 8)))) for _ in range(1000)])
+    # Binomial sd √(0.01/1000) = 0.003; families of independent quantities.
+    assert left < 0.01 + 4 * 0.0032
+    truth, draws = rng.standard_normal((500, 8, 1)), 0.8 * rng.standard_normal((500, 8, sbc.L))
+    assert sbc.outside(names, (draws < truth).sum(axis=2))
+
+
+def test_ranks_of_truth_are_uniform_in_forty_replicates():
+    names, ranks, narrowed = sbc.run(*MODELS["linear law, Coulomb"][:2], 40)
+    assert len(names) == 9
+    assert sbc.outside(names, ranks) == {}
+    assert "joint distance" in sbc.outside(names, narrowed)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("model", MODELS)
+def test_ranks_of_truth_are_uniform(model):
+    declared, options, shape = MODELS[model]
+    names, ranks, narrowed = sbc.run(declared, options, 500, **shape)
+    assert sbc.outside(names, ranks) == {}
+    fired = sbc.outside(names, narrowed)
+    assert "joint distance" in fired
+    assert len(fired) > 1
