@@ -12,8 +12,11 @@ Array = NDArray[np.float64]
 
 L0, R0, T0, ALPHA0 = 50.0, 3.0, 0.7, 72.0
 """The muscle at rest: mm and degrees."""
-MODULI = ((400.0, 1.6e5), (150.0, 4.0e4))
+Moduli = tuple[tuple[float, float], ...]
+MODULI: Moduli = ((400.0, 1.6e5), (150.0, 4.0e4))
 """E_k = a_k P + b_k, P in kPa, E in Pa."""
+MATERIAL: Moduli = ((0.0, 2.2e5), (0.0, 6.0e4))
+"""Moduli that do not depend on pressure, those of the tensile test."""
 K_F = 0.05
 NOISE_N = 0.05
 LEVELS = (100.0, 150.0, 200.0)
@@ -36,7 +39,7 @@ law = "linear"
 """
 
 
-def static_force(pressure_kPa: Array, contraction: Array) -> Array:
+def static_force(pressure_kPa: Array, contraction: Array, moduli: Moduli = MODULI) -> Array:
     """Friction-free force (N) of the declared simulation: inextensible braid, engineering strain."""
     pressure = 1e3 * pressure_kPa
     turns_length = L0 / np.sin(np.radians(ALPHA0))
@@ -48,7 +51,7 @@ def static_force(pressure_kPa: Array, contraction: Array) -> Array:
 
     def stress(strain: Array) -> Array:
         return sum(
-            ((a * pressure_kPa + b) * strain ** (k + 1) for k, (a, b) in enumerate(MODULI)), 0.0 * strain
+            ((a * pressure_kPa + b) * strain ** (k + 1) for k, (a, b) in enumerate(moduli)), 0.0 * strain
         )
 
     square_metres = 1e-6 * np.pi
@@ -57,10 +60,10 @@ def static_force(pressure_kPa: Array, contraction: Array) -> Array:
     return square_metres * (gas + ring * along - 2.0 * radius * wall * tangent * around)
 
 
-def free_contraction(pressure_kPa: float) -> float:
+def free_contraction(pressure_kPa: float, moduli: Moduli = MODULI) -> float:
     """First root of the friction-free force (0 where it does not pull)."""
     grid = np.linspace(0.0, 0.5, 5001)
-    below = static_force(np.full(grid.shape, pressure_kPa), grid) <= 0.0
+    below = static_force(np.full(grid.shape, pressure_kPa), grid, moduli) <= 0.0
     return float(grid[below.argmax()])
 
 
@@ -92,16 +95,18 @@ def csv_text(columns: dict[str, Array | list[str]]) -> str:
     return "\n".join([",".join(columns), *lines]) + "\n"
 
 
-def loops_text(seed: int = 0, rows: int = 150, levels: tuple[float, ...] = LEVELS) -> str:
+def loops_text(
+    seed: int = 0, rows: int = 150, levels: tuple[float, ...] = LEVELS, moduli: Moduli = MODULI
+) -> str:
     """One cycle a level: from free contraction back to L0 and out again, ``rows`` each way."""
     rng = np.random.default_rng(seed)
     parts, start = [], 0.0
     for level in levels:
-        back = np.linspace(0.98 * free_contraction(level), 0.0, rows)
+        back = np.linspace(0.98 * free_contraction(level, moduli), 0.0, rows)
         contraction = np.concatenate([back, back[::-1]])
         sign = np.repeat([1.0, -1.0], rows)
         pressure = np.full(2 * rows, level)
-        force = static_force(pressure, contraction)
+        force = static_force(pressure, contraction, moduli)
         force = force + K_F * np.abs(force) * sign + NOISE_N * rng.standard_normal(2 * rows)
         time = start + 0.1 * np.arange(2 * rows)
         start = time[-1] + 5.0
@@ -121,8 +126,12 @@ def map_text(seed: int = 0, levels: tuple[float, ...] = LEVELS) -> str:
 
 
 def tensile_text(seed: int = 0) -> str:
-    """A tensile test of a material with moduli 60 kPa and 20 kPa."""
+    """A tensile test of the material."""
     rng = np.random.default_rng(seed)
     strain = np.linspace(0.0, 1.0, 200)
-    stress = 6.0e4 * strain + 2.0e4 * strain**2 + 100.0 * rng.standard_normal(200)
-    return csv_text({"strain": strain, "stress_Pa": stress})
+    return csv_text({"strain": strain, "stress_Pa": stress_Pa(strain) + 100.0 * rng.standard_normal(200)})
+
+
+def stress_Pa(strain: Array) -> Array:
+    """The material's stress."""
+    return np.asarray(sum(b * strain ** (k + 1) for k, (_, b) in enumerate(MATERIAL)))

@@ -15,8 +15,8 @@ from .command import PATIENCE, Result, all_gone, contents, finish, kill, living,
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="signals and /proc as Linux has them")
 
-MANY_BLOCKS = ("--no-correlated-noise", "--no-remainder", "--ess", 1e6, "--max-steps", 200)
-"""Five blocks: they stop at the budget, so that every run has as many."""
+MANY_BLOCKS = ("--no-correlated-noise", "--no-remainder", "--ess", 1e6, "--max-steps", 160)
+"""Four blocks: they stop at the budget, so that every run has as many."""
 TABLES = ("summary.csv", "bands.csv", "run.json")
 
 
@@ -39,22 +39,36 @@ def resume(muscle: Path, folder: Path, whole: dict[str, bytes]) -> None:
         assert after[name] == whole[name], name
 
 
-@pytest.mark.parametrize("moment", ["warm_up", "block_00002"])
-def test_a_killed_run_is_resumed(
-    moment: str, muscle: Path, tmp_path: Path, unbroken: tuple[dict[str, bytes], float]
+def test_a_run_killed_twice_and_stopped_by_ctrl_c_ends_as_if_nothing_had_been(
+    muscle: Path, tmp_path: Path, unbroken: tuple[dict[str, bytes], float]
 ) -> None:
     whole, seconds = unbroken
     folder = tmp_path / "run"
-    process = start("calibrate", muscle, "-o", folder, *MANY_BLOCKS)
-    part = folder / "checkpoint" / f"{moment}.checkpoint"
-    assert wait_for(process, part)
-    time.sleep(0.05 * seconds * random.random())
-    kill(process)
-    assert all_gone(process.pid)
-    written = part.stat().st_mtime_ns
+    parts = [
+        folder / "checkpoint" / f"{name}.checkpoint" for name in ("warm_up", "block_00000", "block_00001")
+    ]
+    written: dict[Path, int] = {}
+    for part in parts:
+        process = start("calibrate", muscle, "-o", folder, *MANY_BLOCKS)
+        assert wait_for(process, part)
+        workers = len(living(process.pid)) - 1
+        assert workers > 0
+        # Gone on with, not drawn anew.
+        assert {path: path.stat().st_mtime_ns for path in written} == written
+        if part is parts[-1]:
+            # As a terminal does: to the workers as well.
+            os.killpg(process.pid, signal.SIGINT)
+            result = finish(process)
+            assert result.code == 130
+            assert result.complaint.startswith("interrupted")
+        else:
+            time.sleep(0.03 * seconds * random.random())
+            kill(process)
+        assert all_gone(process.pid)
+        assert not (folder / "run.json").exists()
+        written[part] = part.stat().st_mtime_ns
     resume(muscle, folder, whole)
-    # Gone on with, not drawn anew.
-    assert part.stat().st_mtime_ns == written
+    assert {path: path.stat().st_mtime_ns for path in written} == written
 
 
 @pytest.mark.long
@@ -69,23 +83,6 @@ def test_a_run_killed_at_any_moment_is_resumed(
     kill(process)
     assert all_gone(process.pid)
     resume(muscle, folder, whole)
-
-
-def test_ctrl_c_says_one_line_and_can_be_resumed(
-    muscle: Path, tmp_path: Path, unbroken: tuple[dict[str, bytes], float]
-) -> None:
-    folder = tmp_path / "run"
-    process = start("calibrate", muscle, "-o", folder, *MANY_BLOCKS)
-    assert wait_for(process, folder / "checkpoint" / "block_00000.checkpoint")
-    assert len(living(process.pid)) > 1
-    # As a terminal does: to the workers as well.
-    os.killpg(process.pid, signal.SIGINT)
-    result = finish(process)
-    assert result.code == 130
-    assert result.complaint.startswith("interrupted")
-    assert all_gone(process.pid)
-    assert not (folder / "run.json").exists()
-    resume(muscle, folder, unbroken[0])
 
 
 @pytest.mark.parametrize("delay", [0.4, 1.5])

@@ -1,0 +1,183 @@
+"""The command line itself: help, errors in one line, exit codes, a bar only where someone looks."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from mpam_calib.cli.app import ORDER
+from mpam_calib.cli.progress import sampling_progress
+from mpam_calib.posterior.sampling import Progress
+from mpam_calib.run.predict import parse_pressures
+
+COMMAND = [sys.executable, "-m", "mpam_calib"]
+
+
+def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*COMMAND, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, **environment},
+        check=False,
+    )
+
+
+def test_help_lists_the_commands_in_the_order_of_use() -> None:
+    result = run("--help")
+    assert (result.returncode, result.stderr) == (0, "")
+    listed = re.findall(r"^  ([a-z]+)  ", result.stdout.partition("Commands:")[2], flags=re.MULTILINE)
+    assert {"init", "check", "calibrate", "predict"} <= set(listed) <= set(ORDER)
+    assert listed == [name for name in ORDER if name in listed]
+
+
+@pytest.mark.parametrize("command", ["calibrate", "predict"])
+def test_each_option_is_explained_within_a_window_of_80_columns(command: str) -> None:
+    text = run(command, "--help", COLUMNS="80").stdout
+    assert max(map(len, text.splitlines())) <= 80
+    assert "…" not in text and "\x1b" not in text
+    options = text.partition("Options:")[2]
+    for entry in re.split(r"\n  (?=-)", options.strip("\n")):
+        assert re.search(r" {2,}[A-Z][a-z]+", entry), entry
+
+
+def test_help_of_pressure_says_what_is_meant() -> None:
+    text = " ".join(run("predict", "--help").stdout.split())
+    assert "--pressure A:B:STEP" in text
+    assert "kPa, B included" in text
+
+
+def test_help_comes_at_once() -> None:
+    run("--help")
+    times = []
+    for _ in range(5):
+        before = time.perf_counter()
+        run("--help")
+        times.append(time.perf_counter() - before)
+    assert min(times) < 0.5
+
+
+def test_the_commands_load_nothing_heavy() -> None:
+    heavy = ("numpy", "scipy", "pandas", "arviz", "matplotlib", "emcee", "pydantic", "xarray", "jinja2")
+    code = f"import sys, mpam_calib.cli.app; print([m for m in {heavy!r} if m in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("calbrate",),
+        ("calibrate",),
+        ("calibrate", "x"),
+        ("calibrate", "x", "-o"),
+        ("calibrate", "x", "y", "-o", "z"),
+        ("calibrate", "x", "-o", "z", "--sed", "1"),
+        ("calibrate", "x", "-o", "z", "--seed", "one"),
+        ("calibrate", "x", "-o", "z", "--seed", "-1"),
+        ("calibrate", "x", "-o", "z", "--max-steps", "0"),
+        ("calibrate", "x", "-o", "z", "--ess", "nan"),
+        ("calibrate", "nowhere", "-o", "z"),
+        ("calibrate", "", "-o", "z"),
+        ("predict",),
+        ("predict", "nowhere"),
+        ("predict", "nowhere", "--pressure", "much"),
+        ("--nonsense",),
+    ],
+    ids=" ".join,
+)
+def test_wrong_usage_is_one_line_and_exit_2(
+    arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run(*arguments)
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert re.fullmatch(r"error: \S.*\n", result.stderr), result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_misspelt_command_is_guessed() -> None:
+    assert "calibrate" in run("calbrate").stderr
+
+
+def test_without_a_command_the_help_is_shown() -> None:
+    result = run()
+    assert result.returncode == 2
+    assert "Commands:" in result.stdout
+    assert result.stderr.startswith("error: ") and result.stderr.count("\n") == 1
+
+
+def test_output_that_nobody_reads_is_no_error(tmp_path: Path) -> None:
+    run("init", str(tmp_path / "new"))
+    reader, writer = os.pipe()
+    os.close(reader)
+    result = subprocess.run(
+        [*COMMAND, "check", str(tmp_path / "new")],
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    os.close(writer)
+    assert "Traceback" not in result.stderr
+
+
+BAR = """
+from mpam_calib.cli.app import ORDER
+from mpam_calib.cli.progress import sampling_progress
+from mpam_calib.posterior.sampling import Progress
+import time
+with sampling_progress(400) as tell:
+    tell(Progress("warming up", 0, float("nan"), 0.0, 0.0))
+    for steps in (40, 80, 120):
+        time.sleep(0.3)
+        tell(Progress("sampling", steps, 1.02, steps, steps / 400))
+"""
+
+
+def test_a_terminal_sees_a_bar_with_the_time_left() -> None:
+    leader, follower = pty.openpty()
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "120"}
+    process = subprocess.Popen([sys.executable, "-c", BAR], stderr=follower, env=environment)
+    os.close(follower)
+    seen = b""
+    while True:
+        try:
+            seen += os.read(leader, 4096)
+        except OSError:
+            break
+    os.close(leader)
+    assert process.wait(timeout=60) == 0
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", seen.decode())
+    assert "warming up" in text
+    assert re.search(r"0:00:0\d gone, 0:00:0\d left \(\d+ steps, ESS \d+, R-hat 1\.020\)", text), text
+
+
+def test_a_pipe_sees_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    with sampling_progress(400) as tell:
+        tell(Progress("sampling", 40, 1.02, 40.0, 0.1))
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("100:200:50", [100.0, 150.0, 200.0]),
+        ("0:0.3:0.1", [0.0, 0.1, 0.2, 0.3]),
+        ("100:250:100", [100.0, 200.0, 250.0]),
+        ("100:100:10", [100.0]),
+        ("120", [120.0]),
+        ("0:1:0.333333333", [0.0, 0.333333333, 0.666666666, 1.0]),
+    ],
+)
+def test_pressures_include_the_last(text: str, expected: list[float]) -> None:
+    assert parse_pressures(text).tolist() == expected

@@ -1,0 +1,128 @@
+"""Parts of a checkpoint: everything that sampling keeps comes back as it was, nothing else is built."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpam_calib.posterior.checkpoint import Checkpoint, pack, sweep, unpack, write_atomically
+from mpam_calib.posterior.ensembles import Block, EnsembleState
+from mpam_calib.posterior.mode import Mode
+from mpam_calib.posterior.proposal import StudentMixture
+
+
+@pytest.fixture
+def checkpoint(tmp_path: Path) -> Checkpoint:
+    return Checkpoint(tmp_path / "parts", "digest")
+
+
+def block() -> Block:
+    rng = np.random.RandomState(3)
+    rng.standard_normal()  # half of a pair is kept back: part of the state
+    state = EnsembleState(
+        rng.standard_normal((4, 2)), np.array([-1.0, -np.inf, np.nan, 2.0]), rng.get_state()
+    )
+    return Block(rng.standard_normal((5, 4, 2)), np.zeros((5, 4)), 0.1 + 0.2, state)
+
+
+def test_a_block_comes_back_with_its_random_state(checkpoint: Checkpoint) -> None:
+    saved = block()
+    checkpoint.save("block_00000", [saved, saved])
+    loaded = checkpoint.load("block_00000")
+    assert isinstance(loaded, list) and len(loaded) == 2
+    again = loaded[1]
+    assert type(again) is Block
+    np.testing.assert_array_equal(again.chain, saved.chain)
+    np.testing.assert_array_equal(again.state.log_prob, saved.state.log_prob)
+    assert again.accepted == saved.accepted
+    one, other = np.random.RandomState(), np.random.RandomState()
+    one.set_state(saved.state.random)
+    other.set_state(again.state.random)
+    np.testing.assert_array_equal(one.standard_normal(9), other.standard_normal(9))
+
+
+def test_other_things_that_are_kept_come_back(checkpoint: Checkpoint) -> None:
+    mode = Mode(np.array([1.0, 2.0]), -3.5, np.eye(2))
+    mixture = StudentMixture.build([mode.u], [mode.covariance])
+    part = (None, [mode], mixture, {"a": (1, 2.5, "x", True)}, np.float64(0.1), 2**200, float("inf"))
+    checkpoint.save("part", part)
+    loaded = checkpoint.load("part")
+    assert type(loaded) is tuple
+    assert loaded[0] is None and loaded[3:] == part[3:]
+    assert type(loaded[4]) is np.float64
+    np.testing.assert_array_equal(loaded[1][0].covariance, mode.covariance)
+    np.testing.assert_array_equal(loaded[2].roots, mixture.roots)
+
+
+def test_what_is_not_there_or_not_ours_is_missing(checkpoint: Checkpoint) -> None:
+    assert checkpoint.load("part") is None
+    checkpoint.save("part", [1.0])
+    assert checkpoint.load("part") == [1.0]
+    assert Checkpoint(checkpoint.folder, "another").load("part") is None
+    checkpoint.clear()
+    assert checkpoint.load("part") is None
+
+
+def test_any_changed_or_lost_byte_counts_as_missing(checkpoint: Checkpoint) -> None:
+    checkpoint.save("part", block())
+    path = checkpoint.folder / "part.checkpoint"
+    whole = path.read_bytes()
+    for at in range(0, len(whole), 97):
+        path.write_bytes(whole[:at])
+        assert checkpoint.load("part") is None
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 4]) + whole[at + 1 :])
+        assert checkpoint.load("part") is None
+    path.write_bytes(whole)
+    assert checkpoint.load("part") is not None
+
+
+def test_a_pickle_is_never_run(checkpoint: Checkpoint, tmp_path: Path) -> None:
+    class Trap:
+        def __reduce__(self) -> tuple[object, tuple[str]]:
+            return Path.touch, (tmp_path / "sprung",)  # type: ignore[return-value]
+
+    checkpoint.folder.mkdir()
+    (checkpoint.folder / "part.checkpoint").write_bytes(pickle.dumps(Trap()))
+    assert checkpoint.load("part") is None
+    with pytest.raises(TypeError, match="cannot hold"):
+        checkpoint.save("part", Trap())
+    with pytest.raises(ValueError, match="allow_pickle"):
+        checkpoint.save("part", np.array([Trap()], dtype=object))
+    assert not (tmp_path / "sprung").exists()
+
+
+@pytest.mark.parametrize("name", ["os:system", "pathlib:Path", "mpam_calib.cli:main", "mpam_calib.errors:x"])
+def test_only_dataclasses_of_this_package_are_built(
+    name: str, checkpoint: Checkpoint, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from mpam_calib.posterior import checkpoint as module
+
+    forged = {"class": name, "fields": {}}
+    monkeypatch.setattr(module, "_encode", lambda part, arrays: forged)
+    payload = pack(None, "digest")
+    with pytest.raises(module.Damaged):
+        unpack(payload, "digest")
+
+
+def test_a_write_that_fails_leaves_what_was_there(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text("old")
+
+    def fail(temporary: Path) -> None:
+        temporary.write_text("ne")
+        raise RuntimeError("disk full")
+
+    with pytest.raises(RuntimeError):
+        write_atomically(path, fail)
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_what_a_killed_process_left_is_swept(tmp_path: Path) -> None:
+    (tmp_path / ".table.csv.abc.part").write_text("ne")
+    (tmp_path / ".keep").write_text("mine")
+    sweep(tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == [".keep"]
