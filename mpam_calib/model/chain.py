@@ -125,7 +125,8 @@ class Chain:
         state = replace(state, length=state.rest.L0 - state.displacement)
         state = self._stage(Stage.SHAPE, state, values)
         length = np.maximum(state.length, 0.05 * state.rest.L0)
-        return state, SHAPES[state.kinematics](length, state.rest)
+        shape = SHAPES[state.kinematics](length, state.rest)
+        return replace(state, shape=shape), shape
 
     def _statics(self, state: State, shape: Shape, values: Values) -> tuple[Array, Array]:
         state = self._stage(Stage.STATICS, state, values)
@@ -139,7 +140,7 @@ class Chain:
         per_modulus = modulus_columns(shape, state.rest, simulation.strain, simulation.order)
         readings = state.readings
         mean, columns = self.moduli.columns(readings.pressure, readings.level, per_modulus, values)
-        return fixed + gain * mean, np.broadcast_to(gain, mean.shape)[..., None] * columns
+        return fixed + gain * mean, (gain + np.zeros(mean.shape))[..., None] * columns
 
     def _to_sensor(self, state: State, values: Values) -> State:
         state = self.friction.apply(state, values)
@@ -172,6 +173,7 @@ class Chain:
             rest=rest_of(geometry),
             kinematics=self.setting.simulation.kinematics,
             length=zero,
+            shape=None,
             wall_factor=one,
             lost=zero,
             sign=readings.sign[None, :],

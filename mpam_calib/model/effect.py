@@ -8,7 +8,7 @@ them; nothing else in the package knows any effect by name.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
@@ -39,7 +39,8 @@ class Effect:
     """One effect (see the module's docstring).
 
     ``sentence`` is for a rig engineer; ``source`` names the equation's origin; ``parameters`` gives
-    the priors for a setting; ``apply`` returns the changed state. ``uses_force`` is set where it
+    the priors for a setting; ``apply`` returns the changed state. ``forms`` are other shapes of
+    the same thing with the same parameters, declared as ``id:form``. ``uses_force`` is set where it
     needs the muscle's own force (a fixture that gives way), which the chain then finds by fixed
     point. ``needs_braid`` is set where it needs the declared strands.
     """
@@ -51,6 +52,7 @@ class Effect:
     source: str
     parameters: Callable[[Setting], tuple[Parameter, ...]]
     apply: Callable[[State, Values, Setting], State]
+    forms: Mapping[str, Callable[[State, Values, Setting], State]] = field(default_factory=dict)
     uses_force: bool = False
     needs_braid: bool = False
 
@@ -68,9 +70,11 @@ def register(effect: Effect) -> Effect:
 
 
 def effect(identifier: str) -> Effect:
-    """The effect with this id; raises KeyError where there is none."""
+    """The effect with this id, or this id and form (``id:form``); raises KeyError where there is none."""
     _load_catalogue()
-    return _REGISTRY[identifier]
+    base, _, form = identifier.partition(":")
+    found = _REGISTRY[base]
+    return replace(found, id=identifier, apply=found.forms[form]) if form else found
 
 
 def known_effects() -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
-from mpam_calib.physics.kinematics import Rest
+from mpam_calib.physics.kinematics import Rest, Shape
 from mpam_calib.specimen.declaration import Braid, Geometry, Simulation
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ class State:
     """Arrays of shape (B, n) or broadcastable to it: B parameter vectors, n readings.
 
     rig: ``pressure`` (Pa) and ``displacement`` (m) that the muscle really sees.
-    shape: ``rest``, ``kinematics``, ``tip_factor`` and the working ``length`` (m).
+    shape: ``rest``, ``kinematics``, the working ``length`` (m) and, once solved, the ``shape``.
     statics: ``wall_factor`` on the thickness term, ``lost`` (N) to be subtracted.
     friction: ``sign`` s (fractions while it turns over), ``coulomb`` K and ``strand`` f_s.
     history: ``wall_gain`` on the bladder's stress and ``gain`` on the whole force.
@@ -61,6 +61,7 @@ class State:
     rest: Rest
     kinematics: str
     length: Array
+    shape: Shape | None
     wall_factor: Array
     lost: Array
     sign: Array

@@ -29,6 +29,13 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, pressure=np.maximum(state.pressure - values["P_DB_kPa"], 0.0))
 
 
+def _soft(state: State, values: Values, setting: Setting) -> State:
+    """A gradual onset: the work lost grows to P_DB as the pressure passes it."""
+    band = values["P_DB_kPa"]
+    lost = band * -np.expm1(-state.pressure / np.maximum(np.abs(band), 1.0))
+    return replace(state, pressure=np.maximum(state.pressure - lost, 0.0))
+
+
 register(
     Effect(
         id="dead_band",
@@ -38,5 +45,6 @@ register(
         source="thesis Eq. 2.45; Hocking & Wereley 2013",
         parameters=_parameters,
         apply=_apply,
+        forms={"soft": _soft},
     )
 )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import Normal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -19,6 +21,21 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, zero=state.zero + values["drift_N_per_min"] * state.readings.time)
 
 
+def _settling(state: State, values: Values, setting: Setting) -> State:
+    """A warm-up: the wander slows down, with a third of the test as its time constant."""
+    time = state.readings.time
+    constant = max(float(time.max(initial=0.0)), 1.0) / 3.0
+    wander = values["drift_N_per_min"] * constant * -np.expm1(-time / constant)
+    return replace(state, zero=state.zero + wander)
+
+
+def _square(state: State, values: Values, setting: Setting) -> State:
+    """A wander that speeds up, as fast as the linear one on average."""
+    time = state.readings.time
+    wander = values["drift_N_per_min"] * time**2 / max(float(time.max(initial=0.0)), 1.0)
+    return replace(state, zero=state.zero + wander)
+
+
 register(
     Effect(
         id="force_drift",
@@ -28,5 +45,6 @@ register(
         source="linear in time over the whole test",
         parameters=_parameters,
         apply=_apply,
+        forms={"settling": _settling, "square": _square},
     )
 )

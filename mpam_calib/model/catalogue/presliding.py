@@ -24,6 +24,20 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, sign=state.sign * turned)
 
 
+def _tanh(state: State, values: Values, setting: Setting) -> State:
+    """A hyperbolic tangent of the travel."""
+    readings = state.readings
+    turned = 1.0 - (1.0 + readings.reversal) * (1.0 - np.tanh(readings.travel / values["reversal_mm"]))
+    return replace(state, sign=state.sign * turned)
+
+
+def _slow(state: State, values: Values, setting: Setting) -> State:
+    """A slow approach: many contacts that break one after another."""
+    readings = state.readings
+    turned = 1.0 - (1.0 + readings.reversal) / (1.0 + readings.travel / values["reversal_mm"])
+    return replace(state, sign=state.sign * turned)
+
+
 register(
     Effect(
         id="presliding",
@@ -33,5 +47,6 @@ register(
         source="Dahl's model at constant load: s(1 − 2 exp(−travel/reversal))",
         parameters=_parameters,
         apply=_apply,
+        forms={"tanh": _tanh, "slow": _slow},
     )
 )

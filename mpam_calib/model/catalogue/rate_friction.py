@@ -30,6 +30,20 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, friction_gain=state.friction_gain * gain)
 
 
+def _linear(state: State, values: Values, setting: Setting) -> State:
+    """Friction that grows linearly with speed (viscous), by the same amount over the first decade."""
+    speed = np.where(state.readings.speed > 0.0, state.readings.speed, REFERENCE_SPEED)
+    gain = 1.0 + values["rate_per_decade"] * (speed / REFERENCE_SPEED - 1.0) / 9.0
+    return replace(state, friction_gain=state.friction_gain * np.maximum(gain, 0.0))
+
+
+def _power(state: State, values: Values, setting: Setting) -> State:
+    """Friction that grows with a power of the speed, by the same amount over the first decade."""
+    speed = np.where(state.readings.speed > 0.0, state.readings.speed, REFERENCE_SPEED)
+    factor = np.maximum(1.0 + values["rate_per_decade"], 0.05) ** np.log10(speed / REFERENCE_SPEED)
+    return replace(state, friction_gain=state.friction_gain * factor)
+
+
 register(
     Effect(
         id="rate_friction",
@@ -39,5 +53,6 @@ register(
         source="logarithmic in speed, relative to 50 mm/min",
         parameters=_parameters,
         apply=_apply,
+        forms={"linear": _linear, "power": _power},
     )
 )

@@ -1,0 +1,196 @@
+"""The data as every hypothesis sees them: reduced rows, their noise, and a remainder of several sizes.
+
+The noise is known before any model is fitted (:mod:`mpam_calib.criticism.noise_level`), so for each
+size of the remainder the covariance is one fixed matrix, and a hypothesis is a small least-squares
+problem. The remainder is rich (many half-waves, apart for every branch and, more weakly, for every
+stroke and distant pressure), so that it can hold what nobody thought of.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from mpam_calib.criticism.noise_level import NoiseLevel, noise_level
+from mpam_calib.model.blueprint import Blueprint
+from mpam_calib.model.model import Model, build_model
+from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.bins import bin_loops
+from mpam_calib.posterior.covariance import StrokeCovariance
+from mpam_calib.posterior.points import gather_points
+from mpam_calib.specimen.recording import Specimen
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ROWS = 640
+"""About so many reduced rows; the covariance is dense."""
+HALF_WAVES = 24
+SIZES = (0.0, 0.002, 0.008, 0.03)
+"""Sizes of the remainder as shares of the force scale."""
+SIZE_PRIOR = (0.7, 0.1, 0.1, 0.1)
+STROKE_SHARE = 0.35
+"""Size of each stroke's own part of the remainder, as a share of the common part."""
+PRESSURE_LENGTH = 0.08
+"""Distance in pressure (share of the top level) over which the remainder changes."""
+FORCE_MAP_NOISE = 0.003
+"""Noise of a static reading as a share of the force scale, where no sensor sd is declared."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Reduced rows (n,): two Gauss points each in ``readings`` (2n), ``force`` (N), and where they belong.
+
+    ``level``, ``cycle`` and ``stroke`` (n,) group the rows; ``noise`` (n, n) is the covariance of the
+    readings' noise; ``kernel`` (n, n) the remainder's for size 1 N.
+    """
+
+    blueprint: Blueprint
+    readings: Readings
+    force: Array
+    level: Ints
+    cycle: Ints
+    stroke: Ints
+    noise: Array
+    kernel: Array
+    noise_level: NoiseLevel
+    has_clock: bool
+
+    @cached_property
+    def model(self) -> Model:
+        """The declared simulation, without nuisances or remainder."""
+        return build_model(self.blueprint)
+
+    @cached_property
+    def force_scale(self) -> float:
+        """The specimen's size of a force, N."""
+        assert self.model.setting is not None
+        return self.model.setting.force_scale
+
+    def __len__(self) -> int:
+        return len(self.force)
+
+    def middle(self) -> Readings:
+        """One reading per row."""
+        n = len(self)
+        low, high = self.readings.take(slice(0, n)), self.readings.take(slice(n, None))
+        return replace(
+            low,
+            displacement=0.5 * (low.displacement + high.displacement),
+            travel=0.5 * (low.travel + high.travel),
+        )
+
+    def take(self, rows: NDArray[np.bool_]) -> Problem:
+        """The problem on some of its rows (a fold)."""
+        index = np.flatnonzero(rows)
+        return replace(
+            self,
+            readings=self.readings.take(np.concatenate([index, index + len(self)])),
+            force=self.force[index],
+            level=self.level[index],
+            cycle=self.cycle[index],
+            stroke=self.stroke[index],
+            noise=self.noise[np.ix_(index, index)],
+            kernel=self.kernel[np.ix_(index, index)],
+        )
+
+    def covariance(self, size: float) -> Array:
+        """Noise and a remainder of ``size`` (share of the force scale), N²."""
+        return self.noise + (size * self.force_scale) ** 2 * self.kernel
+
+    @cached_property
+    def roots(self) -> list[Array]:
+        """Cholesky factors of the covariance for each of SIZES."""
+        return [np.asarray(linalg.cholesky(self.covariance(size), lower=True)) for size in SIZES]
+
+    @cached_property
+    def log_dets(self) -> list[float]:
+        """ln|C| for each of SIZES."""
+        return [2.0 * float(np.sum(np.log(np.diagonal(root)))) for root in self.roots]
+
+
+def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
+    """Reduce a specimen's muscle data; ``blueprint`` is the declared simulation's without nuisances."""
+    model = build_model(blueprint)
+    assert model.setting is not None
+    scale = model.setting.force_scale
+    parts: list[tuple[Readings, Readings, Array, Ints, Array]] = []
+    noise: NoiseLevel | None = None
+    blocks: list[Array] = []
+    if specimen.loops is not None:
+        strokes = len(np.unique(specimen.loops.stroke))
+        bins = bin_loops(specimen.loops, int(np.clip(ROWS // strokes, 8, 32)))
+        noise = noise_level(specimen.loops, model)
+        if noise is None:
+            noise = NoiseLevel(_from_differences(bins.force, bins.segment), 0.0, 1.0)
+        layout = StrokeCovariance.build(bins)
+        white, correlated, time = (np.array([v]) for v in (noise.white, noise.correlated, noise.time))
+        padded = layout.matrix(white, correlated, time, np.zeros(1))[0][layout.kind]
+        full = np.zeros((len(bins), len(bins)))
+        for segment in range(bins.segments):
+            rows = np.flatnonzero(bins.segment == segment)
+            at = bins.position[rows]
+            full[np.ix_(rows, rows)] = padded[segment][np.ix_(at, at)]
+        keep = np.flatnonzero(~bins.slack)
+        n = len(bins)
+        low, high = bins.readings.take(keep), bins.readings.take(keep + n)
+        parts.append((low, high, bins.force[keep], bins.segment[keep], np.zeros(0)))
+        blocks.append(full[np.ix_(keep, keep)])
+    points = gather_points(specimen)
+    if points is not None:
+        keep = np.flatnonzero(~points.censored & (points.kind < 2))
+        sd = noise.total if noise else model.setting.force_sd or FORCE_MAP_NOISE * scale
+        noise = noise or NoiseLevel(sd, 0.0, 1.0)
+        rows_of = points.readings.take(keep)
+        parts.append((rows_of, rows_of, points.force[keep], np.full(len(keep), -1), np.zeros(0)))
+        blocks.append(sd**2 * np.eye(len(keep)))
+    assert noise is not None
+    low = Readings.join([part[0] for part in parts])
+    high = Readings.join([part[1] for part in parts])
+    stroke = np.concatenate([part[3] for part in parts])
+    levels = model.setting.levels
+    level = np.abs(low.pressure[:, None] - levels).argmin(axis=1)
+    level = np.where(low.level >= 0, low.level, level)
+    problem = Problem(
+        blueprint=blueprint,
+        readings=Readings.join([low, high]),
+        force=np.concatenate([part[2] for part in parts]),
+        level=level,
+        cycle=np.where(stroke >= 0, low.cycle, 0).astype(np.int64),
+        stroke=stroke,
+        noise=np.asarray(linalg.block_diag(*blocks)),
+        kernel=np.zeros((0, 0)),
+        noise_level=noise,
+        has_clock=specimen.loops is not None,
+    )
+    return replace(problem, kernel=_kernel(problem))
+
+
+def _from_differences(force: Array, segment: Ints) -> float:
+    """Noise sd from second differences within strokes (robust), N."""
+    second = np.diff(force, 2)
+    inside = (segment[2:] == segment[1:-1]) & (segment[1:-1] == segment[:-2])
+    return float(1.4826 * np.median(np.abs(second[inside])) / np.sqrt(6.0)) if inside.any() else 1e-3
+
+
+def _kernel(problem: Problem) -> Array:
+    """The remainder's covariance for size 1 N (rank at most that of its half-waves)."""
+    setting = problem.model.setting
+    assert setting is not None
+    readings = problem.middle()
+    position = readings.displacement / max(setting.stroke, 1e-9)
+    j = np.arange(HALF_WAVES)
+    weights = 1.0 / (1.0 + j)
+    weights /= np.sqrt(np.sum(weights**2 * np.where(j > 0, 0.5, 1.0)))
+    waves = np.cos(np.pi * j * position[:, None]) * weights
+    along = waves @ waves.T
+    pressure = readings.pressure / setting.top_pressure
+    apart = np.exp(-np.abs(pressure[:, None] - pressure) / PRESSURE_LENGTH)
+    branch = readings.sign[:, None] == readings.sign
+    own = (problem.stroke[:, None] == problem.stroke) & (problem.stroke >= 0)[:, None]
+    result: Array = along * (apart * branch + STROKE_SHARE**2 * own)
+    return result

@@ -1,0 +1,220 @@
+"""Searching sets of effects: linearised scores order the search, exact refits decide it.
+
+A set's posterior sums its evidence over the remainder's sizes. A priori a further cause is as likely
+as the average catalogue has it: a set of k out of n effects has prior ∝ RATE^k / C(n, k).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import combinations
+from math import comb, log
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from mpam_calib.criticism.fit import Fit, fit
+from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
+from mpam_calib.model.effect import effect
+
+Array = NDArray[np.float64]
+Set = frozenset[str]
+
+RATE = 0.1
+"""Prior odds of one more cause."""
+WIDTH = 6
+"""Sets of each size that are extended further."""
+PARTNERS = 8
+"""Best single effects that are tried as partners of every kept set."""
+LARGEST = 3
+STARTS = (0.8, -0.8)
+"""Further starts (prior sds) for a single effect: the force is curved in some of them."""
+
+
+@dataclass
+class Search:
+    """All refitted sets so far: fits by (set, size index)."""
+
+    problem: Problem
+    tested: tuple[str, ...]
+    fits: dict[tuple[Set, int], Fit] = field(default_factory=dict)
+    form: dict[str, str] = field(default_factory=dict)
+    """The form in which each effect did best alone."""
+
+    def refit(self, effects: Set, size: int, starts: Iterable[dict[str, float]] = ({},)) -> Fit:
+        """The best exact refit of a set: over its effects' forms and from some starts.
+
+        A single effect is tried in all its forms; a larger set in those that its parts were best in, and
+        then with one form changed at a time. Having had a choice of forms is paid for.
+        """
+        key = (effects, size)
+        if key in self.fits:
+            return self.fits[key]
+        tried = [{e: self.form.get(e, e) for e in effects}]
+        if len(effects) == 1:
+            tried = [{e: form} for e in effects for form in forms_of(e)]
+        best: Fit | None = None
+        for choice in tried:
+            for start in [*starts, *self._inherited(effects, size)]:
+                best = self._better(best, choice, size, start)
+        if best is None:
+            raise np.linalg.LinAlgError(f"no fit of {sorted(effects)}")
+        self.fits[key] = best
+        if len(effects) == 1 and size == self.best_size(effects):
+            self.form.update({e.partition(":")[0]: e for e in best.effects})
+        return best
+
+    def polish(self, effects: Set, size: int) -> None:
+        """Change one form of a set at a time, as long as that helps."""
+        best: Fit | None = self.fits[effects, size]
+        for e in sorted(effects):
+            for form in forms_of(e):
+                assert best is not None
+                choice = {c.partition(":")[0]: c for c in best.effects} | {e: form}
+                best = self._better(best, choice, size, dict(zip(best.names, best.u.tolist(), strict=True)))
+        assert best is not None
+        self.fits[effects, size] = best
+
+    def _better(
+        self, best: Fit | None, choice: dict[str, str], size: int, start: dict[str, float]
+    ) -> Fit | None:
+        try:
+            found = fit(self.problem, frozenset(choice.values()), size, start)
+        except np.linalg.LinAlgError:
+            return best
+        paid = sum(log(len(forms_of(e))) for e in choice)
+        found = replace(found, log_evidence=found.log_evidence - paid)
+        return found if best is None or found.log_evidence > best.log_evidence else best
+
+    def _inherited(self, effects: Set, size: int) -> list[dict[str, float]]:
+        """Where the set's subsets ended: their sizes together are a good place to start."""
+        found: dict[str, float] = {}
+        for smaller in [
+            frozenset(),
+            *map(frozenset, combinations(sorted(effects), max(len(effects) - 1, 1))),
+        ]:
+            known = self.fits.get((smaller, size)) if smaller != effects else None
+            if known is not None:
+                found.update(dict(zip(known.names, known.u.tolist(), strict=True)))
+        return [found] if found else []
+
+    def log_prior(self, effects: Set) -> float:
+        """Log prior of a set (up to a constant)."""
+        n, k = len(self.tested), len(effects)
+        return k * log(RATE) - log(comb(n, k))
+
+    def score(self, effects: Set) -> float:
+        """Log posterior of a set (up to a constant), summed over the sizes that were refitted."""
+        terms = [
+            self.fits[effects, size].log_evidence + log(SIZE_PRIOR[size])
+            for size in range(len(SIZES))
+            if (effects, size) in self.fits
+        ]
+        return float(np.logaddexp.reduce(terms)) + self.log_prior(effects)
+
+    def best_size(self, effects: Set) -> int:
+        """The remainder's size that carries most of a set's posterior."""
+        sizes = [s for s in range(len(SIZES)) if (effects, s) in self.fits]
+        return max(sizes, key=lambda s: self.fits[effects, s].log_evidence + log(SIZE_PRIOR[s]))
+
+    @property
+    def sets(self) -> list[Set]:
+        """All sets seen, best first."""
+        return sorted({key[0] for key in self.fits}, key=lambda s: -self.score(s))
+
+
+def search(
+    problem: Problem,
+    tested: tuple[str, ...],
+    listener: Callable[[float], None] | None = None,
+    width: int = WIDTH,
+) -> Search:
+    """Search sets of up to three effects, the remainder always in play.
+
+    Singles are refitted for every size of the remainder; kept sets are extended by the most promising
+    partners, refitted exactly, and pruned again. ``listener`` is told the share that is done.
+    """
+    tell = listener or (lambda share: None)
+    found = Search(problem, tested)
+    nothing: Set = frozenset()
+    for size in range(len(SIZES)):
+        found.refit(nothing, size)
+    for number, identifier in enumerate(tested):
+        _try(found, frozenset([identifier]), range(len(SIZES)), curved=True)
+        tell(0.3 * (number + 1) / len(tested))
+    kept = _keep(found, 1, width)
+    singles = [next(iter(s)) for s in _keep(found, 1, PARTNERS)]
+    for k in range(2, LARGEST + 1):
+        tries = {s | {p} for s in kept for p in _partners(found, s, singles) if p not in s}
+        for number, effects in enumerate(sorted(tries, key=sorted)):
+            _try(found, effects, (0, 1))
+            tell(0.3 + 0.35 * (k - 2) + 0.35 * (number + 1) / len(tries))
+        kept = _keep(found, k, width)
+        for effects in kept:
+            _try(found, effects, range(len(SIZES)))
+            for size in {0, found.best_size(effects)}:
+                if (effects, size) in found.fits:
+                    found.polish(effects, size)
+    for effects in found.sets[:4]:
+        # A leader's own parts must have been looked at, or it could hide a passenger.
+        for smaller in combinations(sorted(effects), max(len(effects) - 1, 0)):
+            _try(found, frozenset(smaller), range(len(SIZES)))
+    return found
+
+
+def _try(found: Search, effects: Set, sizes: Iterable[int], curved: bool = False) -> None:
+    starts: list[dict[str, float]] = [{}]
+    if curved:
+        names = _own_names(found.problem, effects)
+        starts += [dict.fromkeys(names, value) for value in STARTS]
+    for size in sizes:
+        try:
+            found.refit(effects, size, starts)
+        except np.linalg.LinAlgError:
+            continue
+
+
+@lru_cache
+def forms_of(identifier: str) -> tuple[str, ...]:
+    """The effect's id as it is, and with each of its other forms."""
+    return (identifier, *(f"{identifier}:{form}" for form in effect(identifier).forms))
+
+
+def _own_names(problem: Problem, effects: Set) -> list[str]:
+    setting = problem.model.setting
+    assert setting is not None
+    return [p.name for e in effects for p in effect(e).parameters(setting)]
+
+
+def _keep(found: Search, count: int, width: int) -> list[Set]:
+    """The best sets with this many effects: by posterior, and by fit alone without a remainder."""
+    sets = [s for s in {key[0] for key in found.fits} if len(s) == count]
+    by_score = sorted(sets, key=lambda s: -found.score(s))[:width]
+    bare = [s for s in sets if (s, 0) in found.fits]
+    by_fit = sorted(bare, key=lambda s: -found.fits[s, 0].log_evidence)[: max(width // 2, 1)]
+    return list(dict.fromkeys([*by_score, *by_fit]))
+
+
+def _partners(found: Search, effects: Set, singles: list[str]) -> list[str]:
+    """Effects worth adding to a set: the best linearised gains on its residual, and the best singles."""
+    size = found.best_size(effects)
+    gains = {p: _gain(found, effects, p, size) for p in found.tested if p not in effects}
+    bare = {p: _gain(found, effects, p, 0) for p in gains} if (effects, 0) in found.fits else gains
+    best = sorted(gains, key=lambda p: -gains[p])[:5] + sorted(bare, key=lambda p: -bare[p])[:5]
+    return list(dict.fromkeys([*best, *singles[:4]]))
+
+
+def _gain(found: Search, effects: Set, partner: str, size: int) -> float:
+    """Nats that one linear step along a partner's signature would gain (moduli free)."""
+    single, base = found.fits.get((frozenset([partner]), size)), found.fits[effects, size]
+    nothing = found.fits.get((frozenset(), size))
+    if single is None or nothing is None:
+        return -np.inf
+    root = found.problem.roots[size]
+    signature = linalg.solve_triangular(root, single.force - nothing.force, lower=True)
+    residual = linalg.solve_triangular(root, found.problem.force - base.force, lower=True)
+    power = float(signature @ signature)
+    return 0.5 * float(signature @ residual) ** 2 / power if power > 1e-12 else 0.0

@@ -1,0 +1,96 @@
+"""From the searched sets to a verdict: adequate, named, ambiguous or unexplained."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from mpam_calib.criticism.problem import SIZES
+from mpam_calib.criticism.search import Search, Set
+
+Word = Literal["adequate", "named", "ambiguous", "unexplained"]
+
+SURE, LEAD = 0.95, 5.0
+"""Probability that the named set holds, and nats by which it leads."""
+LISTED = 5
+NOISE_SIZE = 0.5
+"""A remainder below this share of a row's own noise is at the level of the noise."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The word, the leading set, and every set with its probability (best first).
+
+    ``standing`` are the causes that hold even beside a remainder; ``size`` indexes the remainder's size
+    under the leading set.
+    """
+
+    word: Word
+    leading: Set
+    standing: Set
+    probabilities: dict[Set, float]
+    marginals: dict[str, float]
+    size: int
+
+
+def judge(found: Search) -> Verdict:
+    """Apply the contract's rules to a search."""
+    sets = found.sets
+    scores = np.array([found.score(s) for s in sets])
+    weights = np.exp(scores - scores.max())
+    weights /= weights.sum()
+    probabilities = dict(zip(sets, weights.tolist(), strict=True))
+    marginals = {e: float(sum(w for s, w in probabilities.items() if e in s)) for e in found.tested}
+    leading = sets[0]
+    size = found.best_size(leading)
+    structured = _structure_left(found, leading, size)
+    if structured:
+        standing = _standing(found, leading, marginals)
+        return Verdict("unexplained", leading, standing, probabilities, marginals, size)
+    if not leading and probabilities[leading] > 0.5:
+        return Verdict("adequate", leading, frozenset(), probabilities, marginals, size)
+    lead = scores[0] - scores[1] if len(scores) > 1 else np.inf
+    if leading and probabilities[leading] >= SURE and lead >= min(LEAD, _needed(found, sets)):
+        return Verdict("named", leading, leading, probabilities, marginals, size)
+    if not leading or (frozenset() in sets[:LISTED] and probabilities[frozenset()] > 1.0 - SURE):
+        # Nothing is the likeliest, or cannot be excluded: no structure beyond the noise was shown.
+        return Verdict(
+            "adequate", frozenset(), frozenset(), probabilities, marginals, found.best_size(frozenset())
+        )
+    return Verdict("ambiguous", leading, leading, probabilities, marginals, size)
+
+
+def _needed(found: Search, sets: list[Set]) -> float:
+    """The lead asked for: over every set that is not the leading one and more."""
+    return LEAD
+
+
+def _structure_left(found: Search, leading: Set, size: int) -> bool:
+    """Whether a remainder above the noise is needed beside the leading set."""
+    if size == 0:
+        return False
+    bare = found.fits.get((leading, 0))
+    held = found.fits[leading, size]
+    if bare is not None and held.log_evidence - bare.log_evidence < LEAD:
+        return False
+    scale = SIZES[size] * found.problem.force_scale
+    noise = float(np.sqrt(np.median(np.diagonal(found.problem.noise))))
+    return scale > NOISE_SIZE * noise
+
+
+def _standing(found: Search, leading: Set, marginals: dict[str, float]) -> Set:
+    """Causes of the leading set that stand beside any remainder by a clear margin."""
+    standing = set()
+    for e in leading:
+        without = leading - {e}
+        if (without, len(SIZES) - 1) not in found.fits:
+            for size in range(len(SIZES)):
+                found.refit(without, size)
+        margin = found.score(leading) - found.score(without)
+        largest = [found.fits.get((s, len(SIZES) - 1)) for s in (leading, without)]
+        beside = largest[0].log_evidence - largest[1].log_evidence if all(largest) else -np.inf  # type: ignore[union-attr]
+        if marginals[e] >= SURE and margin >= LEAD and beside >= LEAD:
+            standing.add(e)
+    return frozenset(standing)
