@@ -42,6 +42,14 @@ def main() -> None:
     sys.exit(code)
 
 
+class Stopped(KeyboardInterrupt):
+    """Ctrl-C was pressed.
+
+    Not ``KeyboardInterrupt`` itself: when that passes through ``exec`` of a text (which makes every
+    dataclass), Python remembers it as unhandled and ends with a signal instead of our exit code.
+    """
+
+
 class CtrlC:
     """Ctrl-C stops this process; workers that were just forked leave the decision to it."""
 
@@ -53,7 +61,7 @@ class CtrlC:
         """Handle the signal."""
         if os.getpid() == self.process:
             self.pressed = True
-            raise KeyboardInterrupt
+            raise Stopped
 
 
 def _run() -> int:

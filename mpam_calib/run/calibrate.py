@@ -81,10 +81,11 @@ def calibrate_to_folder(
     from mpam_calib.report.calibration import calibration_page
     from mpam_calib.run.view import view_of
 
-    page = calibration_page(view_of(calibration))
+    bands = calibration.bands()
+    page = calibration_page(view_of(calibration, bands))
     folder.clear()
     page.write(run / REPORT)
-    folder.write(calibration)
+    folder.write(calibration, bands)
     if calibration.converged:
         folder.checkpoint.clear()
     return Outcome(calibration.converged, kept=False)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from mpam_calib.calibration import Calibration
 from mpam_calib.errors import InputError
@@ -80,10 +81,10 @@ class RunFolder:
             (self.path / name).unlink(missing_ok=True)
         sweep(self.path)
 
-    def write(self, calibration: Calibration) -> None:
+    def write(self, calibration: Calibration, bands: pd.DataFrame) -> None:
         """Write everything but the report; ``run.json`` comes last, as the mark of a finished run."""
         write_csv(calibration.summary, self.path / "summary.csv")
-        write_csv(calibration.bands(), self.path / "bands.csv")
+        write_csv(bands, self.path / "bands.csv")
         write_posterior(calibration, self.path / "posterior.nc")
         write_json(describe(calibration, self.digest), self.path / "run.json")
 

@@ -33,8 +33,8 @@ PROVENANCE = {
 }
 
 
-def view_of(calibration: Calibration) -> CalibrationView:
-    """The report's view of a calibration."""
+def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
+    """The report's view of a calibration and its bands at the levels."""
     specimen, model, sampling = calibration.specimen, calibration.model, calibration.sampling
     summary = calibration.summary
     worst = summary.iloc[int(summary["rhat"].to_numpy().argmax())]
@@ -47,7 +47,7 @@ def view_of(calibration: Calibration) -> CalibrationView:
         material=specimen.bladder_material,
         simulation=specimen.simulation,
         summary=summary,
-        bands=calibration.bands(),
+        bands=bands,
         observed=observed,
         convergence=Convergence(
             converged=calibration.converged,
@@ -102,7 +102,12 @@ def _headline(calibration: Calibration) -> list[str]:
 
 
 def _learnt(summary: pd.DataFrame) -> pd.DataFrame:
-    """What each parameter's posterior owes to the data."""
+    """What each physical parameter's posterior owes to the data.
+
+    Amplitudes of noise and remainder are left out: what they tell is where they lie, not how narrow
+    they are beside their priors.
+    """
+    summary = summary[~summary["parameter"].isin(NOT_PHYSICS)]
     ratio = summary["sd"] / summary["prior_sd"].replace(0.0, np.nan)
     return pd.DataFrame(
         {
@@ -197,16 +202,32 @@ def _noise(draws: Draws) -> float:
 
 
 def _fit(calibration: Calibration, draws: Draws, readings: Readings) -> tuple[Array, Array, Array]:
-    """Mean and sd (n,) of the simulation without its remainder, and the remainder's mean square (n,)."""
+    """Mean and sd (n,) of the simulation without its remainder, and the remainder's mean square (n,).
+
+    How moduli and remainder share what both can describe is arbitrary: here the moduli have all of it.
+    """
     model = calibration.model
     assert model.chain is not None
     p, q, _ = model.linear_sizes
     force = model.chain.force(draws.values, draws.eta[:, :p], readings)
     square = np.zeros(len(readings))
     if model.remainder is not None:
-        surface = draws.eta[:, p : p + q] @ model.remainder.columns(readings).T
-        square = np.mean((draws.values[SMOOTH] * surface) ** 2, axis=0)
+        surface = draws.values[SMOOTH] * (draws.eta[:, p : p + q] @ model.remainder.columns(readings).T)
+        middle = {
+            name: v.mean(axis=0, keepdims=True).repeat(p + 1, axis=0) for name, v in draws.values.items()
+        }
+        units = model.chain.force(middle, np.eye(p + 1, p, k=0), readings)
+        taken = _taken_up(surface, units[:p] - units[p], _noise(draws))
+        force = force + taken
+        square = np.mean((surface - taken) ** 2, axis=0)
     return force.mean(axis=0), force.std(axis=0), square
+
+
+def _taken_up(surface: Array, columns: Array, noise: float) -> Array:
+    """The part of a remainder (N, n) that moduli with columns (p, n) and unit prior sds could take up."""
+    gram = columns @ columns.T + noise**2 * np.eye(len(columns))
+    taken: Array = np.linalg.solve(gram, columns @ surface.T).T @ columns
+    return taken
 
 
 def _frame(

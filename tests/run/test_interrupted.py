@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import random
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -108,3 +109,21 @@ def _interrupt(muscle: Path, folder: Path, delay: float) -> Result:
     result = finish(process)
     assert all_gone(process.pid, PATIENCE)
     return result
+
+
+STOPPED_IN_EXEC = """
+import os, signal, sys
+from mpam_calib.cli import CtrlC
+signal.signal(signal.SIGINT, CtrlC())
+try:
+    exec("os.kill(os.getpid(), signal.SIGINT)\\nwhile True: pass")
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+
+
+def test_ctrl_c_while_a_class_is_made_keeps_the_exit_code() -> None:
+    result = subprocess.run(
+        [sys.executable, "-c", STOPPED_IN_EXEC], capture_output=True, timeout=60, check=False
+    )
+    assert (result.returncode, result.stderr) == (130, b"")
