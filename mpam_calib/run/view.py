@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mpam_calib.calibration import Calibration
-from mpam_calib.model.model import CONTRACTION_SD
+from mpam_calib.model.model import CONTRACTION_SD, Model
 from mpam_calib.model.noise import CORRELATED, TIME, WHITE
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import ROUGH, SMOOTH
@@ -159,7 +159,7 @@ def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
         frame["time_s"] = middle.time
         frame["cycle"] = middle.cycle
         frames.append(_close(frame, fitted, np.sqrt(parameter_sd**2 + left + rough + _noise(draws) ** 2)))
-        squares.append(left + rough)
+        squares.append((left + rough)[~data.bins.slack])
     if data.points is not None:
         readings = data.points.readings
         fitted, parameter_sd, left = _fit(calibration, draws, readings)
@@ -180,13 +180,14 @@ def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
                 own = float(np.mean(draws.values[CONTRACTION_SD] ** 2))
                 frame["sd_N"] = np.sqrt((sd[rows] / slope) ** 2 + own)
             frames.append(frame)
-            squares.append(left[rows])
+            squares.append(left[rows & ~data.points.censored])
     if data.tensile is not None and model.tensile is not None:
-        frames.append(_tensile_frame(calibration, draws))
+        frame, left = _tensile_frame(calibration, draws)
+        frames.append(frame)
     remainder = float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else float("nan")
     noise = _noise(draws) if WHITE in draws.values else float("nan")
     if model.setting is None and MISFIT in draws.values:
-        remainder = float(np.sqrt(np.mean(draws.values[MISFIT] ** 2)))
+        remainder = float(np.sqrt(np.mean(left)))
         noise = float(np.mean(draws.values[NOISE]))
     observed = (
         pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(OBSERVED_COLUMNS))
@@ -204,7 +205,8 @@ def _noise(draws: Draws) -> float:
 def _fit(calibration: Calibration, draws: Draws, readings: Readings) -> tuple[Array, Array, Array]:
     """Mean and sd (n,) of the simulation without its remainder, and the remainder's mean square (n,).
 
-    How moduli and remainder share what both can describe is arbitrary: here the moduli have all of it.
+    How the simulation and its remainder share what both can describe is arbitrary: here the simulation
+    has all of it.
     """
     model = calibration.model
     assert model.chain is not None
@@ -213,18 +215,27 @@ def _fit(calibration: Calibration, draws: Draws, readings: Readings) -> tuple[Ar
     square = np.zeros(len(readings))
     if model.remainder is not None:
         surface = draws.values[SMOOTH] * (draws.eta[:, p : p + q] @ model.remainder.columns(readings).T)
-        middle = {
-            name: v.mean(axis=0, keepdims=True).repeat(p + 1, axis=0) for name, v in draws.values.items()
-        }
-        units = model.chain.force(middle, np.eye(p + 1, p, k=0), readings)
-        taken = _taken_up(surface, units[:p] - units[p], _noise(draws))
+        taken = _taken_up(surface, _directions(model, draws, readings), _noise(draws))
         force = force + taken
         square = np.mean((surface - taken) ** 2, axis=0)
     return force.mean(axis=0), force.std(axis=0), square
 
 
+def _directions(model: Model, draws: Draws, readings: Readings) -> Array:
+    """How the force (n,) at the posterior's centre changes with each coordinate that moves it (k, n)."""
+    assert model.chain is not None
+    p, d, step = model.linear_sizes[0], len(model.chain.parameters), 0.1
+    u = np.tile(draws.u.mean(axis=0), (d + p + 1, 1))
+    eta = np.tile(draws.eta[:, :p].mean(axis=0), (d + p + 1, 1))
+    u[:d, :d] += step * np.eye(d)
+    eta[d : d + p] += step * np.eye(p)
+    force = model.chain.force(model.values(u), eta, readings)
+    change: Array = (force[:-1] - force[-1]) / step
+    return change
+
+
 def _taken_up(surface: Array, columns: Array, noise: float) -> Array:
-    """The part of a remainder (N, n) that moduli with columns (p, n) and unit prior sds could take up."""
+    """The part of a remainder (N, n) that coordinates with columns (k, n) could take up."""
     gram = columns @ columns.T + noise**2 * np.eye(len(columns))
     taken: Array = np.linalg.solve(gram, columns @ surface.T).T @ columns
     return taken
@@ -255,14 +266,17 @@ def _close(frame: pd.DataFrame, fitted: Array, sd: Array) -> pd.DataFrame:
     return frame.assign(fitted_N=fitted, sd_N=sd)
 
 
-def _tensile_frame(calibration: Calibration, draws: Draws) -> pd.DataFrame:
+def _tensile_frame(calibration: Calibration, draws: Draws) -> tuple[pd.DataFrame, Array]:
+    """The tensile readings beside the law, and the remainder's mean square (n,); see ``_fit``."""
     tensile, model = calibration.target.data.tensile, calibration.model
-    assert tensile is not None
+    assert tensile is not None and model.tensile is not None
     stress = stress_draws(model, draws, tensile.strain, remainder=False)
     whole = stress_draws(model, draws, tensile.strain)
-    left = np.mean((whole - stress) ** 2, axis=0)
     noise = float(np.mean(draws.values[NOISE] ** 2))
-    return pd.DataFrame(
+    surface = whole - stress
+    taken = _taken_up(surface, np.abs(stress).max() * model.tensile.powers(tensile.strain).T, noise**0.5)
+    stress, left = stress + taken, np.mean((surface - taken) ** 2, axis=0)
+    frame = pd.DataFrame(
         {
             "kind": "tensile",
             "level_kPa": np.nan,
@@ -275,3 +289,4 @@ def _tensile_frame(calibration: Calibration, draws: Draws) -> pd.DataFrame:
             "censored": False,
         }
     )
+    return frame, left
