@@ -36,5 +36,7 @@ from mpam_calib.cli import init  # noqa: E402, F401  isort: skip
 from mpam_calib.cli import check  # noqa: E402, F401  isort: skip
 from mpam_calib.cli import calibrate  # noqa: E402, F401  isort: skip
 from mpam_calib.cli import predict  # noqa: E402, F401  isort: skip
+from mpam_calib.cli import optimize  # noqa: E402, F401  isort: skip
 from mpam_calib.cli import reproduce  # noqa: E402, F401  isort: skip
 from mpam_calib.cli import simulate  # noqa: E402, F401  isort: skip
+from mpam_calib.cli import diagnose  # noqa: E402, F401  isort: skip

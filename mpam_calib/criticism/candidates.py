@@ -40,7 +40,7 @@ def candidates(problem: Problem) -> Candidates:
 def _why_not(identifier: str, problem: Problem) -> str | None:
     """None: testable. Empty: part of the simulation already. Else the reason."""
     simulation = problem.blueprint.simulation
-    if identifier in simulation.effects or identifier == f"{simulation.friction}_friction":
+    if identifier in simulation.effect_ids or identifier == f"{simulation.friction}_friction":
         return ""
     if identifier == "braid_kinematics" and simulation.kinematics == "inextensible_braid":
         return ""
@@ -70,4 +70,4 @@ def _why_not(identifier: str, problem: Problem) -> str | None:
 
 def _has_friction(problem: Problem) -> bool:
     simulation = problem.blueprint.simulation
-    return simulation.friction != "none" or any(e.endswith("_friction") for e in simulation.effects)
+    return simulation.friction != "none" or any(e.endswith("_friction") for e in simulation.effect_ids)

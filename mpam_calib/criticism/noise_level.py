@@ -16,7 +16,9 @@ from mpam_calib.specimen.recording import Loops
 Array = NDArray[np.float64]
 
 WINDOW, DEGREE = 32, 3
-"""Windows of at most so many rows, detrended by a polynomial of this degree."""
+"""Windows of at most so many rows, detrended by a polynomial of this degree ..."""
+SHORT_DEGREE = 5
+"""... or of this one, where a stroke is so short that it is one window."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +65,13 @@ def _windows(loops: Loops) -> tuple[Array, int, Array, float] | None:
     """Scatter of detrended windows of consecutive rows inside strokes, away from their ends."""
     first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
     length = np.diff(np.append(first, len(loops.stroke)))
-    size = int(min(WINDOW, np.median(length) // 4))
+    typical = int(np.median(length))
+    size, degree, margin = min(WINDOW, typical // 4), DEGREE, max(min(WINDOW, typical // 4) // 4, 2)
     if size < DEGREE + 4:
+        # The whole stroke, with a stiffer curve taken out: differences of far rows see the curve itself.
+        size, degree, margin = min(WINDOW, int(np.quantile(length, 0.25))), SHORT_DEGREE, 0
+    if size < degree + 3:
         return None
-    margin = max(size // 4, 2)
     starts = [
         np.arange(f + margin, f + n - margin - size + 1, size)
         for f, n in zip(first, length, strict=True)
@@ -79,8 +84,8 @@ def _windows(loops: Loops) -> tuple[Array, int, Array, float] | None:
     index = index[~loops.censored[index].any(axis=1)]
     if len(index) < 4:
         return None
-    full, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, size), DEGREE + 1), mode="complete")
-    contrast = np.asarray(full[:, DEGREE + 1 :], dtype=np.float64)
+    full, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, size), degree + 1), mode="complete")
+    contrast = np.asarray(full[:, degree + 1 :], dtype=np.float64)
     projected = loops.force_N[index] @ contrast
     # A burst or a snap must not pass for noise: windows far above the typical one are left out.
     power = np.mean(projected**2, axis=1)

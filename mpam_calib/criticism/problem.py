@@ -126,7 +126,8 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         bins = bin_loops(specimen.loops, int(np.clip(ROWS // strokes, 8, 32)))
         noise = noise_level(specimen.loops, model)
         if noise is None:
-            noise = NoiseLevel(_from_differences(bins.force, bins.segment), 0.0, 1.0)
+            guess = model.setting.force_sd or _from_differences(bins.force, bins.segment)
+            noise = NoiseLevel(guess, 0.0, 1.0)
         layout = StrokeCovariance.build(bins)
         white, correlated, time = (np.array([v]) for v in (noise.white, noise.correlated, noise.time))
         padded = layout.matrix(white, correlated, time, np.zeros(1))[0][layout.kind]

@@ -27,6 +27,20 @@ EFFECT_IDS: Final[tuple[str, ...]] = (
 )
 """Ids of the effects that ship with the package."""
 
+EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
+    "dead_band": ("soft",),
+    "tip_shape": ("implicit",),
+    "strand_friction": ("proportional",),
+    "rate_friction": ("linear", "power"),
+    "presliding": ("tanh", "slow"),
+    "stress_softening": ("force", "power", "stretched"),
+    "creep": ("power", "settling"),
+    "force_drift": ("settling", "square"),
+    "pressure_droop": ("square",),
+    "rig_compliance": ("stiffening",),
+}
+"""Other forms of some effects, declared as ``id:form``."""
+
 OUTSIDE: Final = "mpam_calib.effects"
 """Entry-point group under which another package names a module that registers effects on import."""
 

@@ -20,11 +20,11 @@ def nuisance_parameters(setting: Setting) -> tuple[Parameter, ...]:
     parameters = []
     for name, attribute in GEOMETRY.items():
         sd = getattr(setting.geometry.sd, name) * si_factor(name)
-        matching = name == "alpha0_deg" and "braid_angle" in setting.simulation.effects
+        matching = name == "alpha0_deg" and "braid_angle" in setting.simulation.effect_ids
         if sd > 0.0 and not matching:
             prior = Normal(getattr(setting.geometry, attribute), sd)
             parameters.append(Parameter(name, prior, "declared, uncertain", "specimen.toml"))
-    if setting.pressure_bias_sd > 0.0 and "dead_band" not in setting.simulation.effects:
+    if setting.pressure_bias_sd > 0.0 and "dead_band" not in setting.simulation.effect_ids:
         # A level at which the muscle was seen to pull had some pressure.
         bias = NormalWithin(0.0, setting.pressure_bias_sd, -setting.pulls_at, np.inf)
         parameters.append(Parameter(BIAS, bias, "true pressure minus the gauge's reading", "specimen.toml"))

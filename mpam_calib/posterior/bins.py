@@ -75,22 +75,22 @@ class LoopBins:
         return Readings(**{**low.__dict__, **both})
 
 
-def _edges(rows: int) -> Ints:
-    """First rows of the bins of a stroke of ``rows`` readings."""
-    if rows <= UNREDUCED:
+def _edges(rows: int, most: int) -> Ints:
+    """First rows of the bins of a stroke of ``rows`` readings: about ``most``, with finer first ones."""
+    if rows <= min(UNREDUCED, most):
         return np.arange(rows)
-    bins = min(BINS, max(UNREDUCED, rows // 4))
+    bins = min(most, max(UNREDUCED, rows // 4))
     fractions = np.arange(bins, dtype=np.float64)
     if rows >= 8 * bins:
         fractions = np.concatenate([[0.0], FINE, fractions[3:]])
     return np.unique(np.round(fractions / bins * rows).astype(np.int64))
 
 
-def bin_loops(loops: Loops) -> LoopBins:
-    """Reduce loops to bins (rows in time order)."""
+def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
+    """Reduce loops (rows in time order) to about ``most`` bins a stroke."""
     stroke_starts = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
     lengths = np.diff(np.append(stroke_starts, len(loops.stroke)))
-    per_stroke = [_edges(int(n)) for n in lengths]
+    per_stroke = [_edges(int(n), most) for n in lengths]
     starts = np.concatenate([s + e for s, e in zip(stroke_starts, per_stroke, strict=True)])
     segment = np.repeat(np.arange(len(lengths)), [len(e) for e in per_stroke])
     position = np.concatenate([np.arange(len(e)) for e in per_stroke])

@@ -113,7 +113,7 @@ def _with_hidden(
         item = effect(identifier)
         if item.needs_braid and specimen.braid is None:
             raise InputError(place, f"{identifier} without [braid]", "the strands' values in specimen.toml")
-        if identifier in blueprint.simulation.effects:
+        if identifier in blueprint.simulation.effect_ids:
             raise InputError(place, f'"{identifier}"', "an effect that the simulation does not declare")
         simulation = blueprint.simulation
         effects = (*simulation.effects, identifier)

@@ -111,7 +111,9 @@ def _check_moduli(source: TomlSource, simulation: Simulation, tensile: bool) -> 
 
 def _check_braid(source: TomlSource, declaration: Declaration) -> None:
     simulation = declaration.simulation
-    users: list[str] = [name for name in ("braid_stretch", "strand_friction") if name in simulation.effects]
+    users: list[str] = [
+        name for name in ("braid_stretch", "strand_friction") if name in simulation.effect_ids
+    ]
     if simulation.friction == "strand":
         users.append('friction = "strand"')
     if users and declaration.braid is None:

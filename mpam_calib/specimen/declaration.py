@@ -48,6 +48,11 @@ class GeometrySd(Table):
     t0_mm: NonNegative = 0.0
     alpha0_deg: NonNegative = 0.0
 
+    @property
+    def alpha0(self) -> float:
+        """1-sigma of the braid angle, rad."""
+        return self.alpha0_deg * DEG
+
 
 class Geometry(Table):
     """Length, outer radius, wall and braid angle (from the hoop direction) at rest."""
@@ -130,6 +135,11 @@ class Simulation(Table):
     law: Law = "linear"
     E_Pa: Annotated[tuple[Finite, ...], Field(min_length=1, max_length=8)] | None = None
     E_rel_sd: NonNegative | None = None
+
+    @property
+    def effect_ids(self) -> tuple[str, ...]:
+        """Ids of the declared effects, without their forms (``id:form``)."""
+        return tuple(effect.partition(":")[0] for effect in self.effects)
 
     @field_validator("moduli")
     @classmethod

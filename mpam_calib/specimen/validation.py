@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from mpam_calib.errors import InputError
-from mpam_calib.model.effect_ids import known_effect_ids
+from mpam_calib.model.effect_ids import EFFECT_FORMS, known_effect_ids
 from mpam_calib.specimen.declaration import Declaration, FileKind
 from mpam_calib.specimen.tables import TABLES
 from mpam_calib.specimen.toml_source import TomlSource
@@ -141,8 +141,13 @@ def _model_of(table: Sequence[str]) -> type[BaseModel]:
 def _check_effects(source: TomlSource, declaration: Declaration) -> None:
     known = known_effect_ids()
     keys = ["simulation", "effects"]
-    effects = declaration.simulation.effects
-    for effect in effects:
+    effects = declaration.simulation.effect_ids
+    for effect, written in zip(effects, declaration.simulation.effects, strict=True):
+        forms = EFFECT_FORMS.get(effect, ())
+        form = written.partition(":")[2]
+        if effect in known and ":" in written and form not in forms:
+            found = f"{quoted(written)}{did_you_mean(form, forms)}"
+            raise fault(source, keys, found, f"{quoted(effect)} or one of its forms: {listed(forms)}")
         if effect not in known:
             found = f"the unknown effect {quoted(effect)}{did_you_mean(effect, known)}"
             raise fault(source, keys, found, f"ids among {listed(known, limit=len(known))}")

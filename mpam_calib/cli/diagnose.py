@@ -1,0 +1,27 @@
+"""``mpam-calib diagnose SPECIMEN -o RUN``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mpam_calib.cli.app import app
+
+
+@app.command()
+def diagnose(
+    specimen: Annotated[Path, typer.Argument(help="specimen folder or its specimen.toml")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="the RUN folder to write")],
+    seed: Annotated[int, typer.Option(help="seed of every random choice", min=0)] = 0,
+) -> None:
+    """Show what the declared simulation gets wrong, name the cause, extend the model, measure the gain."""
+    from mpam_calib.cli.progress import stage_progress
+    from mpam_calib.run.diagnose import diagnose_to_folder
+
+    with stage_progress() as tell:
+        found = diagnose_to_folder(specimen, output, seed=seed, tell=tell)
+    causes = ", ".join(found.causes)
+    print(f"{found.verdict.word}{': ' + causes if causes else ''}")
+    print(f"{output / 'report.html'} written")

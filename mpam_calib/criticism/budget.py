@@ -1,0 +1,72 @@
+"""The misfit budget: how many newtons each cause explains, what remains, what is noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from math import factorial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from mpam_calib.criticism.fit import Fit
+from mpam_calib.criticism.problem import SIZES, Problem
+from mpam_calib.criticism.search import Search, Set
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Root mean squares (N) of the structured part before and after, of the remainder, and the shares."""
+
+    before: float
+    after: float
+    remainder: float
+    noise: float
+    shares: dict[str, float]
+
+
+def structured(problem: Problem, fitted: Fit) -> float:
+    """Mean square (N²) of a fit's residuals beyond what the noise of the rows accounts for."""
+    residual = problem.force - fitted.force
+    return max(float(np.mean(residual**2)) - float(np.mean(np.diagonal(problem.noise))), 0.0)
+
+
+def misfit_budget(found: Search, causes: Set) -> Budget:
+    """Shapley shares of the causes in the misfit that the declared simulation leaves."""
+    problem = found.problem
+    worth: dict[Set, float] = {}
+    for k in range(len(causes) + 1):
+        for part in map(frozenset, combinations(sorted(causes), k)):
+            worth[part] = structured(problem, found.refit(part, 0))
+    before = worth[frozenset()]
+    shares = {}
+    n = len(causes)
+    for e in sorted(causes):
+        share = 0.0
+        for part in worth:
+            if e in part:
+                continue
+            weight = factorial(len(part)) * factorial(n - len(part) - 1) / factorial(n)
+            share += weight * (worth[part] - worth[part | {e}])
+        shares[e] = share / before if before > 0.0 else 0.0
+    fitted = found.fits[causes, found.best_size(causes)]
+    return Budget(
+        before=float(np.sqrt(before)),
+        after=float(np.sqrt(worth[causes])),
+        remainder=remainder_rms(problem, fitted),
+        noise=problem.noise_level.total,
+        shares=shares,
+    )
+
+
+def remainder_rms(problem: Problem, fitted: Fit) -> float:
+    """Root mean square (N) of the remainder's conditional mean; 0 where the fit needs none."""
+    if fitted.size == 0:
+        return 0.0
+    size = SIZES[fitted.size] * problem.force_scale
+    residual = problem.force - fitted.force
+    smooth = size**2 * problem.kernel @ linalg.solve(problem.covariance(SIZES[fitted.size]), residual)
+    return float(np.sqrt(np.mean(smooth**2)))

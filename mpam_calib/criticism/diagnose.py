@@ -1,0 +1,159 @@
+"""Diagnosing one specimen: search, verdict, budget and gain, as plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mpam_calib.criticism.budget import Budget, misfit_budget
+from mpam_calib.criticism.candidates import Candidates, candidates
+from mpam_calib.criticism.gain import Gain, measure_gain
+from mpam_calib.criticism.problem import Problem, build_problem
+from mpam_calib.criticism.search import LARGEST, Search, Set, search
+from mpam_calib.criticism.verdict import LISTED, Verdict, judge
+from mpam_calib.errors import InputError
+from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
+from mpam_calib.model.effect import effect
+from mpam_calib.specimen.recording import Specimen
+from mpam_calib.units import si_factor
+
+DRAWS = 4000
+Tell = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """All that ``diagnosis.json`` and the report are written from."""
+
+    problem: Problem
+    candidates: Candidates
+    search: Search
+    verdict: Verdict
+    budget: Budget
+    gain: Gain | None
+
+    @property
+    def causes(self) -> list[str]:
+        """The causes that are reported, the most probable first."""
+        return sorted(self.verdict.standing, key=lambda e: (-self.verdict.marginals[e], e))
+
+    @property
+    def declared_forms(self) -> tuple[str, ...]:
+        """The causes as a simulation declares them (with their forms)."""
+        chosen = self.search.fits[self.verdict.standing, self.search.best_size(self.verdict.standing)].effects
+        return tuple(sorted(chosen))
+
+
+def diagnose(
+    specimen: Specimen,
+    *,
+    seed: int = 0,
+    material: MaterialPosterior | None = None,
+    tell: Tell | None = None,
+) -> Diagnosis:
+    """Find what the declared simulation gets wrong in a specimen's recordings.
+
+    Raises ``InputError`` where the specimen has no muscle data.
+    """
+    if not (specimen.loops is not None or specimen.force_map is not None):
+        raise InputError(specimen.folder / "specimen.toml", "no loops and no force map", "one to diagnose")
+    listener = tell or (lambda stage, share: None)
+    blueprint = draw_blueprint(specimen, Options(nuisances=False, remainder=False), material)
+    problem = build_problem(specimen, blueprint)
+    tested = candidates(problem)
+    found = search(problem, tested.tested, lambda share: listener("searching", share))
+    verdict = judge(found)
+    budget = misfit_budget(found, verdict.standing)
+    gain = None
+    if verdict.standing:
+        listener("measuring the gain", 0.0)
+        gain = measure_gain(problem, tested.tested, verdict.standing)
+    return Diagnosis(problem, tested, found, verdict, budget, gain)
+
+
+def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
+    """The content of ``diagnosis.json``."""
+    verdict, budget, gain = diagnosis.verdict, diagnosis.budget, diagnosis.gain
+    others = [
+        {"ids": sorted(s), "probability": _round(p)}
+        for s, p in verdict.probabilities.items()
+        if s != verdict.standing and p >= 5e-4
+    ]
+    content: dict[str, Any] = {
+        "verdict": verdict.word,
+        "causes": [_cause(diagnosis, e, seed) for e in diagnosis.causes],
+        "alternatives": others[: LISTED if verdict.word == "ambiguous" else 2 * LISTED],
+        "not_tested": [{"id": i, "why": why} for i, why in diagnosis.candidates.not_tested],
+        "noise_N": _round(budget.noise),
+        "misfit_before_N": _round(budget.before),
+        "misfit_after_N": _round(budget.after),
+        "remainder_N": _round(budget.remainder),
+        "gain": None,
+        "searched": {
+            "sets": len(diagnosis.search.sets),
+            "refits": len(diagnosis.search.fits),
+            "largest": LARGEST,
+        },
+    }
+    if gain is not None:
+        content["gain"] = {
+            "held_out": gain.held_out,
+            "rmse_before_N": _round(gain.rmse_before),
+            "rmse_after_N": _round(gain.rmse_after),
+            "elpd_gain": _round(gain.elpd_gain),
+            "elpd_gain_se": _round(gain.elpd_gain_se),
+            "coverage90_before": _round(gain.coverage90_before),
+            "coverage90_after": _round(gain.coverage90_after),
+            "folds_same_set": gain.folds_same_set,
+            "folds": gain.folds,
+        }
+    return content
+
+
+def _cause(diagnosis: Diagnosis, identifier: str, seed: int) -> dict[str, Any]:
+    """One cause: its probability, parameters (lab units), share and whether it was to be expected."""
+    found, verdict = diagnosis.search, diagnosis.verdict
+    fitted = found.fits[verdict.standing, found.best_size(verdict.standing)]
+    setting = diagnosis.problem.model.setting
+    assert setting is not None
+    written = next(e for e in fitted.effects if e.partition(":")[0] == identifier)
+    parameters: dict[str, dict[str, float]] = {}
+    within = False
+    declared = {"braid_angle": setting.geometry.sd.alpha0, "dead_band": setting.pressure_bias_sd}
+    for number, parameter in enumerate(effect(written).parameters(setting)):
+        i = fitted.names.index(parameter.name)
+        rng = np.random.default_rng([seed, 9, number])
+        u = fitted.u[i] + np.sqrt(fitted.covariance[i, i]) * rng.standard_normal(DRAWS)
+        values = parameter.prior.from_normal(u)
+        factor = si_factor(parameter.name)
+        q05, q95 = np.quantile(values, [0.05, 0.95]) / factor
+        parameters[parameter.name] = {
+            "mean": _round(float(values.mean()) / factor),
+            "sd": _round(float(values.std(ddof=1)) / factor),
+            "q05": _round(float(q05)),
+            "q95": _round(float(q95)),
+        }
+        sd = declared.get(identifier, 0.0)
+        within = sd > 0.0 and abs(float(values.mean())) <= 2.0 * sd
+    return {
+        "id": identifier,
+        "form": written.partition(":")[2],
+        "probability": _round(verdict.marginals[identifier]),
+        "parameters": parameters,
+        "share_of_misfit": _round(diagnosis.budget.shares[identifier]),
+        "within_declared_uncertainty": within,
+    }
+
+
+def _round(x: float) -> float:
+    """Six significant digits: all that is meant, and the same on every machine."""
+    return float(f"{x:.6g}")
+
+
+def extended_effects(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Effects of the extended simulation: the declared ones and the causes."""
+    causes: Set = frozenset(diagnosis.declared_forms)
+    return (*diagnosis.problem.blueprint.simulation.effects, *sorted(causes))

@@ -1,0 +1,188 @@
+"""The diagnosis report: what the simulation gets wrong, why, and what the repair gains."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+
+from mpam_calib.criticism.diagnose import Diagnosis
+from mpam_calib.model.effect import effect
+from mpam_calib.report import wording
+from mpam_calib.report.figures import misfit
+from mpam_calib.report.numbers import significant
+from mpam_calib.report.page import (
+    Block,
+    DataTable,
+    Figure,
+    Headline,
+    KeyNumber,
+    Numbers,
+    Page,
+    Section,
+    Text,
+    Verdict,
+)
+from mpam_calib.specimen.recording import Specimen
+from mpam_calib.units import KPA, unit_of
+
+LEVELS: dict[str, Literal["good", "caution", "bad"]] = {
+    "adequate": "good",
+    "named": "caution",
+    "ambiguous": "caution",
+    "unexplained": "bad",
+}
+SENTENCES = {
+    "adequate": "The declared simulation leaves nothing but noise: these data show no fault in it.",
+    "named": "The declared simulation is wrong, and the cause has a name.",
+    "ambiguous": "The declared simulation is wrong, and these data cannot tell several causes apart.",
+    "unexplained": "The declared simulation is wrong in a way that no known set of causes removes.",
+}
+
+
+def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen) -> Page:
+    """The page for one diagnosis; ``content`` is that of ``diagnosis.json``."""
+    word = found.verdict.word
+    causes = content["causes"]
+    lead: list[Block] = [
+        Headline(SENTENCES[word]),
+        Verdict(_verdict_sentence(content), LEVELS[word], _reasons(content)),
+        Numbers(
+            [
+                KeyNumber("Misfit before", significant(content["misfit_before_N"]), "N", "", "beyond noise"),
+                KeyNumber("Misfit after", significant(content["misfit_after_N"]), "N", "", "beyond noise"),
+                KeyNumber("Noise", significant(content["noise_N"]), "N", "", "of one reading"),
+            ]
+        ),
+    ]
+    sections = [
+        Section("Misfit budget", _budget(found, content)),
+        Section("Causes", _causes(causes)),
+        Section("What else could it be", _alternatives(content)),
+        Section("Gain on data the fit never saw", _gain(content)),
+        Section("What these data cannot test", _not_tested(content)),
+        Section("Simulation", [Text(wording.simulation_sentence(specimen.simulation))]),
+    ]
+    return Page(specimen.name, "Diagnosis: what the simulation gets wrong", lead, sections)
+
+
+def _verdict_sentence(content: dict[str, Any]) -> str:
+    titles = ", ".join(effect(c["id"]).title.lower() for c in content["causes"])
+    if content["verdict"] == "adequate":
+        return "Adequate."
+    if not titles:
+        return f"{content['verdict'].capitalize()}: no cause stands by itself."
+    return f"{content['verdict'].capitalize()}: {titles}."
+
+
+def _reasons(content: dict[str, Any]) -> list[str]:
+    reasons = [
+        f"{effect(c['id']).title}: {effect(c['id']).sentence} (probability {c['probability']:.3g})"
+        for c in content["causes"]
+    ]
+    if content["verdict"] == "unexplained":
+        reasons.append(f"structure of {significant(content['remainder_N'])} N is left beside every set tried")
+    reasons += [
+        f"{effect(c['id']).title} stays inside twice its declared uncertainty"
+        for c in content["causes"]
+        if c["within_declared_uncertainty"]
+    ]
+    return reasons
+
+
+def _budget(found: Diagnosis, content: dict[str, Any]) -> list[Block]:
+    names = [effect(c["id"]).title for c in content["causes"]]
+    before = content["misfit_before_N"]
+    newtons = [before * float(np.sqrt(max(c["share_of_misfit"], 0.0))) for c in content["causes"]]
+    left = content["misfit_after_N"]
+    problem, search = found.problem, found.search
+    standing = found.verdict.standing
+    fits = [search.fits[frozenset(), 0], search.fits[standing, 0]]
+    middle = problem.middle()
+    assert problem.model.setting is not None
+    maps = misfit.residual_maps(
+        middle.displacement / problem.model.setting.geometry.L0,
+        middle.sign,
+        problem.model.setting.levels[problem.level] / KPA,
+        problem.force - fits[0].force,
+        problem.force - fits[1].force,
+        float(np.sqrt(np.median(np.diagonal(problem.noise)))),
+    )
+    return [
+        Figure(
+            misfit.budget([*names, "still unexplained"], [*newtons, left], content["noise_N"]),
+            "Each bar is the root of a cause's Shapley share of the squared misfit.",
+            "Bars of the newtons that each cause explains",
+        ),
+        Figure(
+            maps,
+            "Reduced readings minus the refitted simulation; grey: twice the noise of a reduced reading. "
+            "Triangles up: loading, down: unloading.",
+            "Residuals before and after",
+        ),
+    ]
+
+
+def _causes(causes: list[dict[str, Any]]) -> list[Block]:
+    if not causes:
+        return [Text("None is named.")]
+    rows = [
+        {
+            "cause": effect(c["id"]).title,
+            "what it means": effect(c["id"]).sentence,
+            "probability": c["probability"],
+            "parameter": name,
+            "mean": values["mean"],
+            "5 %": values["q05"],
+            "95 %": values["q95"],
+            "unit": unit_of(name),
+            "share of misfit": c["share_of_misfit"],
+        }
+        for c in causes
+        for name, values in (c["parameters"] or {"": {"mean": np.nan, "q05": np.nan, "q95": np.nan}}).items()
+    ]
+    formats = dict.fromkeys(["probability", "mean", "5 %", "95 %", "share of misfit"], "{:.3g}")
+    return [DataTable(pd.DataFrame(rows), "Causes with their sizes (90 % bands)", formats)]
+
+
+def _alternatives(content: dict[str, Any]) -> list[Block]:
+    if not content["alternatives"]:
+        return [Text("No other set of causes has a probability above 0.0005.")]
+    rows = [
+        {
+            "set": ", ".join(a["ids"]) or "nothing beyond the declared simulation",
+            "probability": a["probability"],
+        }
+        for a in content["alternatives"]
+    ]
+    return [DataTable(pd.DataFrame(rows), "Other sets of causes", {"probability": "{:.3g}"})]
+
+
+def _gain(content: dict[str, Any]) -> list[Block]:
+    gain = content["gain"]
+    if gain is None:
+        return [Text("Nothing is named, so there is nothing to gain.")]
+    rows = [
+        {"": "held-out error (N)", "before": gain["rmse_before_N"], "after": gain["rmse_after_N"]},
+        {
+            "": "coverage of 90 % bands",
+            "before": gain["coverage90_before"],
+            "after": gain["coverage90_after"],
+        },
+    ]
+    text = (
+        f"Whole {gain['held_out']} groups were held out, {gain['folds']} folds, with search and fit "
+        f"repeated in each; "
+        f"{gain['folds_same_set']} of them chose the same causes. The held-out readings are "
+        f"{gain['elpd_gain']:.4g} ± {gain['elpd_gain_se']:.3g} nats more probable with the extended model."
+    )
+    formats = dict.fromkeys(["before", "after"], "{:.3g}")
+    return [Text(text), DataTable(pd.DataFrame(rows), "Before and after, held out", formats)]
+
+
+def _not_tested(content: dict[str, Any]) -> list[Block]:
+    if not content["not_tested"]:
+        return [Text("Every effect of the catalogue could be tested.")]
+    rows = [{"effect": effect(n["id"]).title, "why not": n["why"]} for n in content["not_tested"]]
+    return [DataTable(pd.DataFrame(rows), "Effects that these data are silent on", None)]

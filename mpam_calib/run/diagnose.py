@@ -1,0 +1,52 @@
+"""``diagnose`` from a specimen folder to a RUN folder: diagnosis.json, extended/, report.html."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import tomlkit
+
+from mpam_calib.criticism.diagnose import Diagnosis, Tell, describe, diagnose, extended_effects
+from mpam_calib.errors import InputError
+from mpam_calib.posterior.checkpoint import write_atomically
+from mpam_calib.report.diagnosis import diagnosis_page
+from mpam_calib.run.calibrate import resolve_material
+from mpam_calib.run.files import write_json
+from mpam_calib.specimen import read
+from mpam_calib.specimen.recording import Specimen
+
+
+def diagnose_to_folder(source: Path, run: Path, *, seed: int = 0, tell: Tell | None = None) -> Diagnosis:
+    """Diagnose a specimen into a RUN folder; raises ``InputError`` before anything is written."""
+    specimen = read(source)
+    if run.exists() and not run.is_dir():
+        raise InputError(run, "a file", "a folder to write into, or a new name")
+    found = diagnose(specimen, seed=seed, material=resolve_material(specimen), tell=tell)
+    toml = source / "specimen.toml" if source.is_dir() else source
+    write_extended(found, specimen, toml, run / "extended")
+    content = describe(found, seed)
+    diagnosis_page(found, content, specimen).write(run / "report.html")
+    write_json(content, run / "diagnosis.json")
+    return found
+
+
+def write_extended(found: Diagnosis, specimen: Specimen, toml: Path, folder: Path) -> None:
+    """The specimen with the causes among its effects, its data files beside it: ``calibrate`` takes it."""
+    document = tomlkit.parse(toml.read_text(encoding="utf-8-sig"))
+    simulation = document.setdefault("simulation", tomlkit.table())
+    simulation["effects"] = list(extended_effects(found))
+    moduli = str(simulation.get("moduli", ""))
+    if moduli.startswith("run:"):
+        # The path is relative to the specimen's folder; the extended one stands elsewhere.
+        target = (specimen.folder / moduli.removeprefix("run:").strip()).resolve()
+        simulation["moduli"] = f"run:{os.path.relpath(target, folder.resolve())}"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    for file in specimen.files:
+        destination = folder / file.name
+        destination.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(specimen.folder / file.name, destination)
+    text = tomlkit.dumps(document)
+    write_atomically(folder / "specimen.toml", lambda p: p.write_text(text, encoding="utf-8"))
