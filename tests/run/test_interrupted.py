@@ -122,8 +122,8 @@ except KeyboardInterrupt:
 """
 
 
-def test_ctrl_c_while_a_class_is_made_keeps_the_exit_code() -> None:
-    result = subprocess.run(
-        [sys.executable, "-c", STOPPED_IN_EXEC], capture_output=True, timeout=60, check=False
-    )
+def test_ctrl_c_while_a_class_is_made_keeps_the_exit_code(tmp_path: Path) -> None:
+    (tmp_path / "stopped.py").write_text(STOPPED_IN_EXEC)
+    command = [sys.executable, "-m", "stopped"]
+    result = subprocess.run(command, capture_output=True, timeout=60, check=False, cwd=tmp_path)
     assert (result.returncode, result.stderr) == (130, b"")
