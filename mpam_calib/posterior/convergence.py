@@ -39,7 +39,6 @@ def diagnose_chains(chains: Array) -> Diagnostics:
     ArviZ's with each walker a chain (time must not be interleaved) and emcee's N/τ.
     """
     import arviz as az
-    from emcee.autocorr import integrated_time
 
     E, T, W, d = chains.shape
     rhat, bulk, tail = np.empty(d), np.empty(d), np.empty(d)
@@ -49,8 +48,18 @@ def diagnose_chains(chains: Array) -> Diagnostics:
         separate = np.moveaxis(x, 2, 1).reshape(E * W, T)
         total = float(E * T * W)
         # A block that is shorter than τ cannot show it; τ is at least what the ensembles show apart.
-        tau = max(float(integrated_time(x[e][..., None], quiet=True, tol=0)[0]) for e in range(E))
+        tau = max(_autocorrelation_time(x[e]) for e in range(E))
         limit = total / max(tau, 1.0)
         bulk[i] = min(float(az.ess(separate, method="bulk")), limit)
         tail[i] = min(float(az.ess(separate, method="tail")), limit)
     return Diagnostics(rhat, bulk, tail)
+
+
+def _autocorrelation_time(x: Array) -> float:
+    """emcee's τ of one ensemble's series (steps, walkers); a walker that never moved counts as one draw."""
+    from emcee.autocorr import integrated_time
+
+    moved = np.ptp(x, axis=0) > 0.0
+    share = float(moved.mean())
+    tau = float(integrated_time(x[:, moved, None], quiet=True, tol=0)[0]) if moved.any() else 0.0
+    return share * tau + (1.0 - share) * len(x)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -91,3 +93,16 @@ def test_each_parameter_has_its_own_figures():
     x = np.concatenate([ar1(0.0, 8), ar1(0.95, 9)], axis=-1)
     found = diagnose_chains(x)
     assert found.ess_bulk[0] > 10.0 * found.ess_bulk[1]
+
+
+def test_a_stuck_walker_does_not_hide_the_others_tau():
+    """emcee's estimate is nan with a constant series among the walkers; it must still bound ESS."""
+    x = ar1(0.95, 10)
+    free = diagnose_chains(x).ess_bulk[0]
+    x[1, :, 3] = 0.2
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # emcee's 0/0
+        held = diagnose_chains(x).ess_bulk[0]
+    assert 0.0 < held < free
+    x[:] = np.arange(4.0)[:, None, None, None]
+    assert not diagnose_chains(x).converged
