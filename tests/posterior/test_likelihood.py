@@ -151,6 +151,24 @@ def test_agrees_with_the_slow_twin(name):
     assert target.log_posterior(u) == pytest.approx(fast + prior, rel=1e-12)
 
 
+def test_strokes_that_are_nearly_alike_share_a_covariance():
+    """Strokes within 2 % of each other are given one covariance: a tenth of a nat across the posterior."""
+    nearly = build.loops((100.0, 150.0, 200.0), (10.0, 10.15, 9.85), (600, 608, 593), dt=0.01)
+    made, blueprint = simulated(build.specimen(LINEAR, nearly), FULL)
+    target, modes = locate(build_target(made, blueprint), np.random.default_rng(0))
+    twin = Twin(made, blueprint)
+    rng = np.random.default_rng(0)
+    d = len(modes[0].u)
+    u = modes[0].u + rng.standard_normal((5, d)) @ np.linalg.cholesky(modes[0].covariance).T
+    values = target.model.values(u)
+    fast = target.log_likelihood(values)
+    slow = [twin.log_likelihood({k: float(v[i, 0]) for k, v in values.items()}) for i in range(5)]
+    off = fast - slow
+    assert np.ptp(fast) > 0.5
+    assert np.ptp(off) < 0.2
+    assert np.std(off) < 0.1
+
+
 @pytest.mark.parametrize("name", ["rows, remainder", "bins, correlated", "all files", "tensile alone"])
 def test_the_linear_part_is_drawn_from_its_exact_distribution(name):
     """Mean and covariance of the moduli's coefficients and of the remainder's, and their normality."""
