@@ -32,7 +32,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "tip_shape": ("implicit",),
     "strand_friction": ("proportional",),
     "rate_friction": ("linear", "power"),
-    "presliding": ("tanh", "slow"),
+    "presliding": ("rest", "tanh", "slow"),
     "stress_softening": ("force", "power", "stretched"),
     "creep": ("power", "settling"),
     "force_drift": ("settling", "square"),

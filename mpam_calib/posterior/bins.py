@@ -164,9 +164,8 @@ def row_readings(loops: Loops) -> Readings:
 
 
 def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array, Array]:
-    """Travel since the stroke began (rows), whether a reversal began it, its speed, time at the level."""
+    """Travel since the turn (rows), whether a reversal began the stroke, its speed, time at the level."""
     segment = np.repeat(np.arange(len(first)), lengths)
-    travel = np.abs(loops.displacement_m - loops.displacement_m[first][segment])
     same_level = np.zeros(len(first), dtype=bool)
     same_level[1:] = (loops.level[first][1:] == loops.level[first][:-1]) & (
         loops.clock[first][1:] == loops.clock[first][:-1]
@@ -177,6 +176,14 @@ def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Ar
     duration = np.maximum(loops.time_s[last] - loops.time_s[first], 1e-9)
     # Net travel over time: encoder noise would inflate a sum of steps.
     speed = np.abs(loops.displacement_m[last] - loops.displacement_m[first]) / duration
+    # The turn lies between two readings: what is left of a step was travelled on either side of it.
+    step = speed * duration / np.maximum(lengths - 1, 1)
+    before = np.concatenate([[0.0], loops.displacement_m[last][:-1]])
+    back = loops.displacement_m[first] - before
+    direction = np.sign(loops.displacement_m[last] - loops.displacement_m[first])
+    since_turn = np.where(same_level & opposite, 0.5 * (step + direction * back), 0.5 * step)
+    since_turn = np.clip(since_turn, 0.0, step)
+    travel = since_turn[segment] + np.abs(loops.displacement_m - loops.displacement_m[first][segment])
     run = np.cumsum(~same_level) - 1
     level_start = loops.time_s[first][~same_level]
     at_level = loops.time_s - level_start[run][segment]

@@ -17,24 +17,28 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
+    # Every stroke begins with a turn: before a level's first one the muscle was pressurised, and moved.
     readings = state.readings
-    # From −s before the reversal to s after it; a first stroke from rest starts at 0.
-    drop = 1.0 + readings.reversal
-    turned = 1.0 - drop * np.exp(-readings.travel / values["reversal_mm"])
+    turned = 1.0 - 2.0 * np.exp(-readings.travel / values["reversal_mm"])
+    return replace(state, sign=state.sign * turned)
+
+
+def _from_rest(state: State, values: Values, setting: Setting) -> State:
+    """A level's first stroke starts without friction, not against it."""
+    readings = state.readings
+    turned = 1.0 - (1.0 + readings.reversal) * np.exp(-readings.travel / values["reversal_mm"])
     return replace(state, sign=state.sign * turned)
 
 
 def _tanh(state: State, values: Values, setting: Setting) -> State:
     """A hyperbolic tangent of the travel."""
-    readings = state.readings
-    turned = 1.0 - (1.0 + readings.reversal) * (1.0 - np.tanh(readings.travel / values["reversal_mm"]))
+    turned = 2.0 * np.tanh(state.readings.travel / values["reversal_mm"]) - 1.0
     return replace(state, sign=state.sign * turned)
 
 
 def _slow(state: State, values: Values, setting: Setting) -> State:
     """A slow approach: many contacts that break one after another."""
-    readings = state.readings
-    turned = 1.0 - (1.0 + readings.reversal) / (1.0 + readings.travel / values["reversal_mm"])
+    turned = 1.0 - 2.0 / (1.0 + state.readings.travel / values["reversal_mm"])
     return replace(state, sign=state.sign * turned)
 
 
@@ -47,6 +51,6 @@ register(
         source="Dahl's model at constant load: s(1 − 2 exp(−travel/reversal))",
         parameters=_parameters,
         apply=_apply,
-        forms={"tanh": _tanh, "slow": _slow},
+        forms={"rest": _from_rest, "tanh": _tanh, "slow": _slow},
     )
 )
