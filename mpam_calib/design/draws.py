@@ -1,129 +1,165 @@
 """A calibrated muscle in the optimiser: blocked force and free contraction of a design for every draw.
 
-Moduli that were fitted at one R and t are carried to another here; that is an extrapolation, and
-whoever reports a design must say so.
+The force is the calibrated model's own, with all its effects, at another geometry: what was fitted at
+one R, t and α is carried to others. That is an extrapolation, and whoever reports a design must say so.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.design.blocked import blocked_force, braid_loss
-from mpam_calib.design.problem import Function
-from mpam_calib.physics.kinematics import SHAPES, Rest, Shape, tip_shortened_length
-from mpam_calib.physics.statics import axial_lever, gas_force, hoop_lever, modulus_columns, thickness_force
+from mpam_calib.design.problem import E_BR, Function
+from mpam_calib.model.chain import Chain
+from mpam_calib.model.model import Model
+from mpam_calib.model.readings import Readings
+from mpam_calib.model.remainder import SMOOTH
+from mpam_calib.posterior.draws import Draws
+from mpam_calib.prediction.curves import LIMIT, STEP, first_root
+from mpam_calib.specimen.declaration import Braid
+from mpam_calib.units import DEG, GPA, MM, si_factor
 
 Array = NDArray[np.float64]
+
+STRANDS = "braid_stretch"
+"""The effect whose term (Eq. 2.25) is the braid's in Eq. 3.12."""
+STRANDS_FACTOR = "braid_factor"
+STEEPEST, FLATTEST = 89.0 * DEG, 1.0 * DEG
+"""No tolerance turns a strand beyond these."""
+GRID = np.arange(round(LIMIT / STEP) + 1, dtype=np.float64) * STEP
+"""Contractions on which the first root is looked for, shape (γ,)."""
 
 
 @dataclass(frozen=True)
 class MuscleDraws:
-    """Draws of what a design does not choose, at one pressure; every array has shape (draws,).
+    """A model with N draws of its posterior and of the tolerances to which a new muscle is built.
 
-    Pressure ``P`` and ``dead_band`` in Pa, ``delta_alpha`` in rad (the posterior's angle error plus, if
-    wanted, draws of the manufacturing tolerance), ``wall_factor``, ``tip_factor`` and ``braid_factor`` as
-    in the effects of those names (0: not in the model), ``moduli`` E_k(P) of shape (draws, M) in Pa.
+    ``tolerance``: SI deviations (N, 1) from the drawing, by the names of the geometry's values. What
+    the run found of its own specimen's geometry is not carried over: a new muscle has its own.
     """
 
-    P: float
-    L0: float
-    kinematics: Literal["inextensible_braid", "constant_thickness"]
-    strain: Literal["engineering", "stretch"]
-    moduli: Array
-    dead_band: Array
-    delta_alpha: Array
-    wall_factor: Array
-    tip_factor: Array
-    braid_factor: Array
-    E_br: float
+    model: Model
+    draws: Draws
+    tolerance: dict[str, Array]
 
     @classmethod
-    def none(cls, P: float, moduli: Array, **declared: object) -> MuscleDraws:
-        """Draws with nothing but moduli: every effect is zero unless given by name."""
-        zero = np.zeros(moduli.shape[0])
-        values: dict[str, object] = {
-            "L0": 0.05,
-            "kinematics": "constant_thickness",
-            "strain": "stretch",
-            "dead_band": zero,
-            "delta_alpha": zero,
-            "wall_factor": zero,
-            "tip_factor": zero,
-            "braid_factor": zero,
-            "E_br": 2.1e9,
+    def prepare(cls, model: Model, draws: Draws, count: int, seed: int) -> MuscleDraws:
+        """At most ``count`` draws; the tolerances are the declared sds, stratified normal deviates."""
+        assert model.setting is not None
+        few = draws.thin(count)
+        rng = np.random.default_rng([seed, 9])
+        sds = model.setting.geometry.sd.model_dump()
+        tolerance = {
+            name: float(sd) * si_factor(name) * _deviates(len(few), rng)[:, None] for name, sd in sds.items()
         }
-        return cls(P=P, moduli=moduli, **(values | declared))  # type: ignore[arg-type]
+        return cls(model, few, tolerance)
+
+    def __len__(self) -> int:
+        return len(self.draws)
+
+    def blocked_forces(self, P: float, x: Array) -> Array:
+        """Friction-free force at rest length (N) of designs x (..., 3 or 5) at P (Pa); (..., N)."""
+        flat = np.asarray(x, dtype=np.float64).reshape(-1, np.shape(x)[-1])
+        zero = np.zeros(len(flat))
+        force = self._force(flat, Readings.at_rest(zero + P, zero))
+        return force.T.reshape(*np.shape(x)[:-1], len(self))
+
+    def curves(self, P: float, x: Array, gamma: Array) -> Array:
+        """Friction-free force (N) of one design x (3 or 5,) at P (Pa) and contractions γ; (N, γ)."""
+        assert self.model.setting is not None
+        L0 = self.model.setting.geometry.L0
+        return self._force(np.asarray(x)[None, :], Readings.at_rest(np.asarray(P), L0 * gamma))
+
+    def free_contractions(self, P: float, x: Array) -> Array:
+        """First root of the friction-free force of one design, (N,).
+
+        0 where F(0) <= 0, the grid's end (``LIMIT``) where there is none before it.
+        """
+        return first_root(GRID, self.curves(P, x, GRID))
+
+    def _force(self, x: Array, readings: Readings) -> Array:
+        """Force (N, n) of designs (n or 1, 3 or 5) at readings (n,), the smooth remainder included."""
+        chain, values = self._chain(x), self._values(x)
+        p, q, _ = self.model.linear_sizes
+        force = chain.force(values, self.draws.eta[:, :p], readings)
+        if self.model.remainder is not None:
+            left = self.draws.eta[:, p : p + q] @ self.model.remainder.columns(readings).T
+            force = force + self.draws.values[SMOOTH] * left * self._share(x)
+        return force
+
+    def _chain(self, x: Array) -> Chain:
+        """The model's chain; with five variables the strands are the design's, and they stretch.
+
+        The moduli's block stays the run's own: its coordinates mean coefficients at the geometry of
+        the tested muscle.
+        """
+        setting = self.model.setting
+        assert setting is not None
+        if x.shape[-1] == 5:
+            # One value for each design: the effects broadcast, which a declared braid need not.
+            strands = {"R_br_mm": x[:, 3] / MM, "n": x[:, 4]}
+            braid = self._braid().model_copy(update=strands)
+            effects = setting.simulation.effects
+            if not self._has_strands:
+                effects = (*effects, STRANDS)
+            simulation = setting.simulation.model_copy(update={"effects": effects})
+            setting = replace(setting, braid=braid, simulation=simulation)
+        return Chain(setting, self.model.moduli)
 
     @property
-    def pressure(self) -> Array:
-        """Pressure that does work, Pa, shape (draws,)."""
-        return np.maximum(self.P - self.dead_band, 0.0)
+    def _has_strands(self) -> bool:
+        assert self.model.setting is not None
+        return any(e.partition(":")[0] == STRANDS for e in self.model.setting.simulation.effects)
+
+    def _braid(self) -> Braid:
+        """The declared braid; without one, strands as stiff as in chapter 3."""
+        assert self.model.setting is not None
+        declared = self.model.setting.braid
+        return declared or Braid(E_br_GPa=E_BR / GPA, nu_s=0.33, R_br_mm=0.11, n=48)
+
+    def _values(self, x: Array) -> dict[str, Array]:
+        """The draws' values with the designs' geometry, deviations included, as (N, n) arrays."""
+        assert self.model.setting is not None
+        drawn = {
+            "L0_mm": np.full(len(x), self.model.setting.geometry.L0),
+            "R0_mm": x[:, 0],
+            "t0_mm": x[:, 1],
+            "alpha0_deg": x[:, 2],
+        }
+        built = {name: drawing[None, :] + self.tolerance[name] for name, drawing in drawn.items()}
+        built["alpha0_deg"] = np.clip(built["alpha0_deg"], FLATTEST, STEEPEST)
+        for name in ("L0_mm", "R0_mm", "t0_mm"):
+            built[name] = np.maximum(built[name], 0.01 * drawn[name])
+        values = {**self.draws.values, **built}
+        if x.shape[-1] == 5 and not self._has_strands:
+            values[STRANDS_FACTOR] = np.ones((len(self), 1))
+        return values
+
+    def _share(self, x: Array) -> Array:
+        """Ideal gas force at rest length over that of the tested muscle, (n,): the remainder's scale."""
+        assert self.model.setting is not None
+        own = self.model.setting.geometry
+        ideal = x[:, 0] ** 2 * (2.0 * np.tan(x[:, 2]) ** 2 - 1.0)
+        tested = own.R0**2 * (2.0 * np.tan(own.alpha0) ** 2 - 1.0)
+        share: Array = np.maximum(ideal / tested, 0.0) if tested > 0.0 else np.ones(len(x))
+        return share
 
 
-def blocked_forces(draws: MuscleDraws, x: Array) -> Array:
-    """Blocked force (N) of designs x (..., 3 or 5), shape (..., draws).
+def _deviates(count: int, rng: np.random.Generator) -> Array:
+    """Standard normal deviates (count,), one from the middle of each of as many equal strata, shuffled."""
+    from scipy.special import ndtri
 
-    Designs are R, t, α (Case II) or R, t, α, R_br, n (Case I, whose braid term then counts in full
-    unless the draws carry a ``braid_factor``).
-    """
-    x = np.asarray(x)[..., None, :]
-    R, t = x[..., 0], x[..., 1]
-    alpha = x[..., 2] + draws.delta_alpha
-    P = draws.pressure
-    shape = Shape(R, R, t, np.tan(alpha) ** 2)
-    force = blocked_force(P, R, t, alpha) - draws.wall_factor * thickness_force(P, shape)
-    if draws.strain == "stretch":
-        # At rest length both stretches are 1, so that the sum of the moduli is all that matters.
-        force = force + draws.moduli.sum(axis=-1) * (axial_lever(shape) - hoop_lever(shape))
-    if x.shape[-1] == 5:
-        share = np.where(draws.braid_factor == 0.0, 1.0, draws.braid_factor)
-        force = force - share * braid_loss(P, R, alpha, x[..., 3], x[..., 4], draws.E_br)
-    return np.asarray(force)
+    deviates: Array = ndtri((rng.permutation(count) + 0.5) / count)
+    return deviates
 
 
-def forces_along(draws: MuscleDraws, x: Array, gamma: Array) -> Array:
-    """Friction-free force (N) of one design R, t, α at contractions γ, shape (draws, γ)."""
-    R0, t0 = np.asarray(x[0]), np.asarray(x[1])
-    rest = Rest(np.asarray(draws.L0), R0, t0, (x[2] + draws.delta_alpha)[:, None])
-    P = draws.pressure[:, None]
-    shape_of = SHAPES[draws.kinematics]
-    L = draws.L0 * (1.0 - gamma) + np.zeros_like(P)
-    shape = shape_of(L, rest)
-    if np.any(draws.tip_factor):
-        shape = shape_of(tip_shortened_length(L, shape.R, rest, draws.tip_factor[:, None]), rest)
-    columns = modulus_columns(shape, rest, draws.strain, draws.moduli.shape[-1])
-    bladder = np.einsum("dgk,dk->dg", columns, draws.moduli)
-    thickness = (1.0 - draws.wall_factor[:, None]) * thickness_force(P, shape)
-    return np.asarray(gas_force(P, shape) + thickness + bladder)
+def mean_force(muscle: MuscleDraws, P: float) -> Function:
+    """The posterior mean of the blocked force at P (Pa) as an objective (N)."""
+    return lambda x: np.asarray(muscle.blocked_forces(P, x).mean(axis=-1))
 
 
-def free_contractions(draws: MuscleDraws, x: Array, limit: float = 0.5, points: int = 501) -> Array:
-    """First root of the friction-free force of one design, shape (draws,).
-
-    0 where F(0) <= 0, nan where F stays positive up to ``limit``; linear between grid points.
-    """
-    gamma = np.linspace(0.0, limit, points)
-    F = forces_along(draws, x, gamma)
-    below = F <= 0.0
-    first = np.argmax(below, axis=1)
-    found = below.any(axis=1)
-    rows = np.flatnonzero(found & (first > 0))
-    out = np.where(found, 0.0, np.nan)
-    i = first[rows]
-    f0, f1 = F[rows, i - 1], F[rows, i]
-    out[rows] = gamma[i - 1] + (gamma[i] - gamma[i - 1]) * f0 / (f0 - f1)
-    return out
-
-
-def mean_force(draws: MuscleDraws) -> Function:
-    """The posterior mean of the blocked force as an objective (N)."""
-    return lambda x: np.asarray(blocked_forces(draws, x).mean(axis=-1))
-
-
-def quantile_force(draws: MuscleDraws, q: float = 0.05) -> Function:
-    """A quantile of the blocked force as an objective (N): what can be relied on."""
-    return lambda x: np.asarray(np.quantile(blocked_forces(draws, x), q, axis=-1))
+def quantile_force(muscle: MuscleDraws, P: float, q: float = 0.05) -> Function:
+    """A quantile of the blocked force at P (Pa) as an objective (N): what can be relied on."""
+    return lambda x: np.asarray(np.quantile(muscle.blocked_forces(P, x), q, axis=-1))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpam_calib.design import blocked, draws
+from mpam_calib.design import blocked
 from mpam_calib.design.optimality import optimality
 from mpam_calib.design.problem import RATIO_LOW, case_one, case_two
 from mpam_calib.design.search import hybrid, refine
@@ -14,6 +14,8 @@ from mpam_calib.physics.kinematics import Rest
 from mpam_calib.physics.statics import braid_energy_force
 from mpam_calib.thesis import decoded
 from mpam_calib.units import DEG, MM
+
+from . import by_hand as draws
 
 P = 200e3
 R, ALPHA = 3 * MM, 72 * DEG

@@ -1,0 +1,398 @@
+"""The report of ``optimize``: the best designs, what they rest on and how far they are extrapolated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from mpam_calib.design.robust import Design, Packed
+from mpam_calib.model.blueprint import Blueprint
+from mpam_calib.prediction.curves import LIMIT, Reach
+from mpam_calib.report.figures import style
+from mpam_calib.report.numbers import fixed, significant, with_band
+from mpam_calib.report.page import (
+    Block,
+    DataTable,
+    Figure,
+    Headline,
+    KeyNumber,
+    Notice,
+    Numbers,
+    Page,
+    Section,
+    Text,
+    Verdict,
+)
+from mpam_calib.report.spoken import spoken
+from mpam_calib.units import DEG, KPA, MM
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as MplFigure
+
+Array = NDArray[np.float64]
+
+SHOWN_AT = 200.0 * KPA
+"""The pressure of the first screen, Pa: that of the thesis's own optimum."""
+LAWS = {
+    "constant": "they are taken not to depend on pressure at all",
+    "linear": "their straight lines are drawn on",
+    "exponential": "their exponentials run on, and grow as exponentials do",
+    "exponential_each": "their exponentials run on, and grow as exponentials do",
+    "free": "they are held at the values of the nearest level",
+}
+AIMS = {"posterior_mean": "largest mean", "q05": "largest 5 % quantile"}
+
+
+@dataclass(frozen=True)
+class DesignsView:
+    """What the page shows.
+
+    ``designs`` in the order of pressure; ``table`` is designs.csv; ``packed`` one for each pressure,
+    all with the upper bounds ``radii`` (m) of R_br; ``printed`` Table 3.5's forces (N) by case, one for
+    each pressure; ``draws`` how many stand behind the searches and behind the bands.
+    """
+
+    name: str
+    converged: bool
+    blueprint: Blueprint
+    designs: Sequence[Design]
+    table: pd.DataFrame
+    packed: Sequence[Packed]
+    radii: Sequence[float]
+    printed: Mapping[str, Array]
+    draws: tuple[int, int]
+
+    @property
+    def levels(self) -> Array:
+        """Recorded pressures, Pa."""
+        return np.array(self.blueprint.levels)
+
+    @property
+    def pressures(self) -> list[float]:
+        """Pressures of the designs, Pa."""
+        return sorted({d.P for d in self.designs})
+
+    @property
+    def reach(self) -> Reach:
+        """Where the recordings end."""
+        return Reach(self.levels, np.array(self.blueprint.reach))
+
+    def best(self, case: str, method: str = "posterior_mean") -> list[Design]:
+        """The designs of a case by one method, by pressure."""
+        chosen = [d for d in self.designs if d.case == case and d.method == method]
+        return sorted(chosen, key=lambda d: d.P)
+
+
+def designs_page(view: DesignsView) -> Page:
+    """The whole page."""
+    return Page(
+        f"Designs: {view.name}",
+        "Muscles with the largest blocked force, under the posterior of this run",
+        lead=[_extrapolation(view), *_lead(view), _trust(view)],
+        sections=[_by_pressure(view), _packing(view), _bands(view)],
+        footer="Case I: R, t, α, R_br, n (thesis Eq. 3.12, 3.15). Case II: R, t, α (Eq. 3.16, 3.18). "
+        "Bounds and constraints of Table 3.1.",
+    )
+
+
+def _extrapolation(view: DesignsView) -> Notice:
+    geometry = view.blueprint.geometry
+    assert geometry is not None
+    x = np.array([d.x[:3] for d in view.designs])
+    spans = [
+        f"{symbol} = {_span(x[:, i] / unit, digits)}{name}"
+        for i, (symbol, unit, name, digits) in enumerate(
+            (("R", MM, " mm", 2), ("t", MM, " mm", 3), ("α", DEG, "°", 1))
+        )
+    ]
+    low, high = view.levels[0] / KPA, view.levels[-1] / KPA
+    return Notice(
+        f"Extrapolated. Everything that was fitted, the moduli above all, was fitted to one muscle with "
+        f"R = {geometry.R0_mm:g} mm, t = {geometry.t0_mm:g} mm, α = {geometry.alpha0_deg:g}° at {low:.0f} to "
+        f"{high:.0f} kPa. Here it is carried to {', '.join(spans)} and to "
+        f"{view.pressures[0] / KPA:.0f}–{view.pressures[-1] / KPA:.0f} kPa, as if moduli belonged to the "
+        "material alone. Moduli fitted at one R and t need not hold at another, and no band on this page "
+        "contains that error: build and test a design before relying on it."
+    )
+
+
+def _span(values: Array, digits: int) -> str:
+    low, high = fixed(float(values.min()), digits), fixed(float(values.max()), digits)
+    return low if low == high else f"{low}–{high}"
+
+
+def _shown(view: DesignsView) -> float:
+    return min(view.pressures, key=lambda P: abs(P - SHOWN_AT))
+
+
+def _lead(view: DesignsView) -> list[Block]:
+    P = _shown(view)
+    row = view.pressures.index(P)
+    two = view.best("II")[row]
+    one = view.best("I")[row]
+    force, force_band = _band(two.force)
+    free, free_band = _contraction(two.contraction)
+    sentence = Markup(
+        "At {:.0f} kPa the muscle with the largest expected force (Case II: R {}, t {} mm, α {}°) should "
+        "pull with {} and shorten by {} of its length without load."
+    ).format(
+        P / KPA,
+        fixed(two.x[0] / MM, 2),
+        fixed(two.x[1] / MM, 3),
+        fixed(two.x[2] / DEG, 1),
+        spoken(force, force_band, "N"),
+        spoken(free, free_band, "%"),
+    )
+    value, band = _band(one.force)
+    cautious = view.best("II", "q05")[row]
+    q05 = float(np.quantile(cautious.force, 0.05))
+    printed = view.printed["II"][row]
+    return [
+        Headline(sentence),
+        Numbers(
+            [
+                KeyNumber(
+                    "Case II", force, "N", f"90 % band: {force_band} N", "the wall and the angle chosen"
+                ),
+                KeyNumber(
+                    "Case I", value, "N", f"90 % band: {band} N", f"with {one.x[4]:.0f} strands chosen"
+                ),
+                KeyNumber(
+                    "Nineteen in twenty exceed", fixed(q05, 1), "N", note="Case II by its 5 % quantile"
+                ),
+                KeyNumber(
+                    "Thesis, Table 3.5", f"{printed:.2f}", "N", note="Case II, without any uncertainty"
+                ),
+            ]
+        ),
+    ]
+
+
+def _band(draws: Array) -> tuple[str, str]:
+    low, high = np.quantile(draws, [0.05, 0.95])
+    return with_band(float(draws.mean()), float(low), float(high))
+
+
+def _contraction(draws: Array) -> tuple[str, str]:
+    """Mean and 90 % band of free contractions, in percent; an end where no root was found says so."""
+    value, band = _band(100.0 * draws)
+    if np.quantile(draws, 0.95) < LIMIT - 1e-9:
+        return value, band
+    low = band.split("–")[0]
+    return f"at least {value}", f"{low} to beyond {100 * LIMIT:.0f}"
+
+
+def _trust(view: DesignsView) -> Verdict:
+    reasons = []
+    P = np.array(view.pressures)
+    outside = P[view.reach.outside(P)] / KPA
+    law = view.blueprint.simulation.law
+    if outside.size:
+        reasons.append(
+            f"{', '.join(f'{p:.0f}' for p in outside)} kPa lie outside the recorded pressures: the moduli's "
+            f"law ({law.replace('_', ' ')}) is extrapolated, {LAWS[law]}, and the bands hold the law's "
+            "constants, not the doubt about its shape."
+        )
+    far = [
+        d for d in view.best("II") if d.contraction.mean() > float(view.reach.at(np.array(d.P))) * 1.02 + 1e-3
+    ]
+    if far:
+        listed = ", ".join(f"{d.P / KPA:.0f}" for d in far)
+        reasons.append(f"Free contraction lies beyond the recorded contractions at {listed} kPa (Case II).")
+    rootless = [d for d in view.designs if d.without_root > 0.0]
+    if rootless:
+        worst = max(d.without_root for d in rootless)
+        reasons.append(
+            f"In up to {worst:.0%} of the draws the force stays positive to {LIMIT:.0%} contraction; "
+            "these count with that contraction, so that means and upper ends are too low."
+        )
+    if not view.converged:
+        reasons.append("The calibration did not converge within its budget.")
+    sd = view.blueprint.geometry.sd if view.blueprint.geometry else None
+    if sd is None or sd.alpha0_deg == 0.0:
+        reasons.append("The specimen declares no sd of the braid angle: the bands hold no tolerance of it.")
+    return Verdict("A forecast for muscles that nobody has built.", "caution", reasons)
+
+
+def _by_pressure(view: DesignsView) -> Section:
+    rows = []
+    outside = view.reach.outside(np.array(view.pressures))
+    for d in sorted(view.designs, key=lambda d: (d.case, d.P)):
+        i = view.pressures.index(d.P)
+        force, force_band = _band(d.force)
+        free, free_band = _contraction(d.contraction)
+        strands = (fixed(d.x[3] / MM, 2), f"{d.x[4]:.0f}") if len(d.x) == 5 else ("–", "–")
+        geometry = (fixed(d.x[0] / MM, 3), fixed(d.x[1] / MM, 4), fixed(d.x[2] / DEG, 2))
+        printed, held = f"{view.printed[d.case][i]:.2f}", "; ".join(d.held_by) or "nothing"
+        outcome = (f"{force} ({force_band})", printed, f"{free} ({free_band})", held, bool(outside[i]))
+        rows.append((d.case, d.P / KPA, AIMS[d.method], *geometry, *strands, *outcome))
+    names = ["case", "kPa", "aim", "R mm", "t mm", "α °", "R_br mm", "n", "blocked force N"]
+    names += ["Table 3.5 N", "free contraction %", "held by", "pressure extrapolated"]
+    frame = pd.DataFrame(rows, columns=names)
+    apart = sorted(
+        {
+            round(a.P / KPA)
+            for case in ("I", "II")
+            for a, b in zip(view.best(case), view.best(case, "q05"), strict=True)
+            if not np.allclose(a.x, b.x, rtol=1e-4)
+        }
+    )
+    words = "Both aims lead to the same design: what raises the mean raises the lower end of the band."
+    if apart:
+        words = (
+            f"The two aims lead to different designs at {', '.join(map(str, apart))} kPa, where some force "
+            "can be given up for less doubt; elsewhere what raises the mean raises the lower end of the band."
+        )
+    return Section(
+        "Force and free contraction by pressure",
+        [
+            Figure(
+                _figure(view),
+                "Design of the largest mean at each pressure: median, 50 % and 90 % bands. Dashed: ends of "
+                "the 90 % band of the other aim's design. Crosses: Table 3.5. Grey: outside the recorded "
+                "pressures.",
+                "Blocked force and free contraction against pressure with bands, for both cases.",
+            ),
+            Text(words),
+            DataTable(frame, "Mean and 90 % band of each design, beside Table 3.5.", {"kPa": "{:.0f}"}),
+        ],
+    )
+
+
+def _packing(view: DesignsView) -> Section:
+    names = [f"R_br to {radius / MM:g} mm" for radius in view.radii]
+    rows = []
+    for item, two in zip(view.packed, view.best("II"), strict=True):
+        cells: list[object] = [item.P / KPA, float(two.force.mean()), item.free]
+        for x, force in zip(item.x, item.force, strict=True):
+            cells += [force, f"{x[4]:.0f} × {fixed(x[3] / MM, 3)} mm"]
+        rows.append(cells)
+    columns = ["kPa", "Case II", "Case I"]
+    for name in names:
+        columns += [f"packed, {name}", f"strands, {name}"]
+    i = view.pressures.index(_shown(view))
+    item, one, two = view.packed[i], view.best("I")[i], view.best("II")[i]
+    whole = float(two.force.mean())
+    taken = " and ".join(
+        f"{significant(whole - force, 2)} N with {x[4]:.0f} strands of R_br = {fixed(x[3] / MM, 2)} mm"
+        for x, force in zip(item.x, item.force, strict=True)
+    )
+    # Half of the strands run each way.
+    fit = np.floor(np.pi * one.x[0] * np.sin(one.x[2]) / one.x[3])
+    formats = dict.fromkeys([c for c in columns if not c.startswith("strands")], "{:.2f}") | {"kPa": "{:.0f}"}
+    return Section(
+        "Strands that fit",
+        [
+            Text(
+                f"Case I within the thesis's bounds ends at {one.x[4]:.0f} strands of R_br = "
+                f"{fixed(one.x[3] / MM, 2)} mm at {item.P / KPA:.0f} kPa; of such strands {fit:.0f} in each "
+                f"direction fit round the muscle. They cost {significant(whole - item.free, 2)} N against "
+                "Case II, and that the braid's term is negligible follows from them alone. With strands that "
+                f"must fit, it takes {taken}: the first within Table 3.1's bound, the last no thicker than a "
+                "real monofilament. The designs in designs.csv are those without this constraint, as in the "
+                "thesis."
+            ),
+            DataTable(pd.DataFrame(rows, columns=columns), "Posterior mean of blocked force (N).", formats),
+        ],
+    )
+
+
+def _bands(view: DesignsView) -> Section:
+    rows = []
+    for d in view.best("II"):
+        ends = [np.subtract(*np.quantile(draws, [0.95, 0.05])) for draws in (d.force, d.exact)]
+        rows.append((d.P / KPA, float(d.force.mean()), float(d.force.std()), float(d.exact.std()), *ends))
+    names = ["kPa", "mean N", "sd N", "sd without tolerance N", "band's width N", "width without tolerance N"]
+    frame = pd.DataFrame(rows, columns=names)
+    blueprint = view.blueprint
+    assert blueprint.geometry is not None
+    sds = {k: v for k, v in blueprint.geometry.sd.model_dump().items() if v > 0.0}
+    told = ", ".join(f"{name} {value:g}" for name, value in sds.items()) or "none is declared"
+    effects = blueprint.simulation.effects
+    strands = (
+        "the fitted multiple of it"
+        if any(e.startswith("braid_stretch") for e in effects)
+        else "taken in full"
+    )
+    stiff = (
+        f"{blueprint.braid.E_br_GPa:g} GPa"
+        if blueprint.braid
+        else "2.1 GPa, chapter 3's, none being declared"
+    )
+    return Section(
+        "What the bands hold",
+        [
+            Text(
+                f"Every draw of the posterior goes through the model itself, with its effects "
+                f"({', '.join(effects) or 'none declared'}) and the gauge's offset, at the new geometry. "
+                "Moduli in engineering strain do not act on the blocked force, in stretch they do. "
+                "Manufacturing: "
+                f"every draw is built with its own deviation from the drawing, of the declared sd ({told}); "
+                "what the run found about the tested muscle's own geometry stays with that muscle. The "
+                "remainder (what the physics left unexplained) is carried as the same share of the ideal gas "
+                "force at rest length. Left out: the sensor's noise, a single stroke's own remainder, and "
+                "friction, for the force is the mean of both branches.\n\n"
+                f"Case I subtracts the energy in the strands (Eq. 2.25, {strands}; E_br = {stiff}). Case II "
+                "leaves the strands as they are declared. Length at rest stays "
+                f"{blueprint.geometry.L0_mm:g} mm.\n\n"
+                f"The searches (differential evolution, then SQP) use {view.draws[0]} draws, the bands "
+                f"{view.draws[1]}."
+            ),
+            DataTable(
+                frame,
+                "Case II, largest mean: how much of the band is tolerance, and how much the posterior.",
+                dict.fromkeys(names[1:], "{:.2f}") | {"kPa": "{:.0f}"},
+            ),
+        ],
+    )
+
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+
+def _figure(view: DesignsView) -> MplFigure:
+    """Blocked force and free contraction against pressure, one row of panels for each case."""
+    P = np.array(view.pressures) / KPA
+    with style.applied():
+        figure = style.new_figure(5.2)
+        for row, case in enumerate(("I", "II")):
+            left, right = (figure.add_subplot(2, 2, 2 * row + column) for column in (1, 2))
+            mean, other = view.best(case), view.best(case, "q05")
+            for ax, colour, scale, quantity in (
+                (left, style.BLUE, 1.0, "force"),
+                (right, style.GREEN, 100.0, "contraction"),
+            ):
+                style.band(ax, P, _quantiles([getattr(d, quantity) for d in mean]), colour, scale)
+                ends = scale * _quantiles([getattr(d, quantity) for d in other])[["q05", "q95"]].to_numpy()
+                ax.plot(P, ends, "--", color=style.INK, linewidth=0.8)
+                _shade(ax, P, view.levels / KPA)
+                ax.set_ylim(bottom=0.0)
+            left.plot(P, view.printed[case], "x", color=style.INK, markersize=5, label="Table 3.5")
+            left.legend(frameon=False, fontsize=7.5)
+            left.set_title(f"Case {case}: blocked force")
+            right.set_title(f"Case {case}: free contraction")
+            left.set_ylabel("blocked force (N)")
+            right.set_ylabel("contraction without load (%)")
+        for ax in figure.axes[2:]:
+            ax.set_xlabel("pressure (kPa)")
+    return figure
+
+
+def _quantiles(draws: Sequence[Array]) -> pd.DataFrame:
+    """One row of quantiles for each set of draws."""
+    names = [f"q{round(100 * q):02d}" for q in QUANTILES]
+    return pd.DataFrame(np.array([np.quantile(d, QUANTILES) for d in draws]), columns=names)
+
+
+def _shade(ax: Axes, P: Array, levels: Array) -> None:
+    """Grey where the pressure was not recorded."""
+    for low, high in ((float(P.min()), float(levels[0])), (float(levels[-1]), float(P.max()))):
+        if high > low:
+            ax.axvspan(low, high, color=style.GREY, alpha=0.12, linewidth=0)
