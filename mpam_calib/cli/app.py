@@ -40,3 +40,4 @@ from mpam_calib.cli import optimize  # noqa: E402, F401  isort: skip
 from mpam_calib.cli import reproduce  # noqa: E402, F401  isort: skip
 from mpam_calib.cli import simulate  # noqa: E402, F401  isort: skip
 from mpam_calib.cli import diagnose  # noqa: E402, F401  isort: skip
+from mpam_calib.cli import select  # noqa: E402, F401  isort: skip

@@ -16,15 +16,18 @@ def reproduce(
     seed: Annotated[int, typer.Option(help="seed of the stochastic searches", min=0)] = 0,
     mpam1: Annotated[Path | None, typer.Option(help="RUN folder whose bands are shown for MPAM1")] = None,
     mpam2: Annotated[Path | None, typer.Option(help="RUN folder whose bands are shown for MPAM2")] = None,
+    mpam1_strand: Annotated[
+        Path | None, typer.Option(help="RUN folder of MPAM1 with strand friction, for f_s and Fig. 4.21")
+    ] = None,
 ) -> None:
     """Recompute every table and number of the thesis and name its misprints."""
     from rich.console import Console
 
     from mpam_calib.thesis.page import page
-    from mpam_calib.thesis.posterior import MuscleBands
+    from mpam_calib.thesis.posterior import MPAM1, MPAM1_STRAND, MPAM2, MuscleBands, missing
     from mpam_calib.thesis.reproduction import reproduce as recompute
 
-    runs = {"MPAM1": mpam1, "MPAM2": mpam2}
+    runs = {MPAM1: mpam1, MPAM2: mpam2, MPAM1_STRAND: mpam1_strand}
     bands = {name: MuscleBands.read(name, run) for name, run in runs.items() if run is not None}
     result = recompute(seed)
     out.mkdir(parents=True, exist_ok=True)
@@ -32,4 +35,7 @@ def reproduce(
     page(result, bands).write(out / "report.html")
     console = Console()
     console.print(result.ledger.summary(), soft_wrap=True)
+    absent = missing(bands)
+    if len(absent):
+        console.print(f"without a posterior: {'; '.join(absent['run'])} (see the report's last section)")
     console.print(f"see {out / 'report.html'}", soft_wrap=True)

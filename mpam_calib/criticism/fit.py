@@ -62,12 +62,19 @@ def chain_for(key: str, effects: frozenset[str]) -> Chain:
     return chain
 
 
-def fit(problem: Problem, effects: frozenset[str], size: int, start: dict[str, float] | None = None) -> Fit:
+def fit(
+    problem: Problem,
+    effects: frozenset[str],
+    size: int,
+    start: dict[str, float] | None = None,
+    blueprint: Blueprint | None = None,
+) -> Fit:
     """Refit the simulation with these effects against a remainder of SIZES[size].
 
-    ``start`` gives coordinates by parameter name to start from (0 otherwise).
+    ``start`` gives coordinates by parameter name to start from (0 otherwise); ``blueprint`` another
+    declared simulation than the problem's.
     """
-    chain = chain_for(problem.blueprint.model_dump_json(), effects)
+    chain = chain_for((blueprint or problem.blueprint).model_dump_json(), effects)
     names = tuple(p.name for p in chain.parameters)
     d, p, n = len(names), chain.linear_size, len(problem)
     root = problem.roots[size]

@@ -19,6 +19,7 @@ from mpam_calib.criticism.fit import STEP, Fit, chain_for
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.search import Search, Set, search
 from mpam_calib.criticism.verdict import judge
+from mpam_calib.model.blueprint import Blueprint
 
 Array = NDArray[np.float64]
 
@@ -90,12 +91,13 @@ def _fold(task: tuple[Problem, tuple[str, ...], NDArray[np.bool_]]) -> _Fold:
     return _Fold(
         residuals=(residuals[0], residuals[1]),
         inside=(np.abs(residuals[0]) <= Z90 * sds[0], np.abs(residuals[1]) <= Z90 * sds[1]),
-        elpd=(_log_density(residuals[0], results[0][1]), _log_density(residuals[1], results[1][1])),
+        elpd=(log_density(residuals[0], results[0][1]), log_density(residuals[1], results[1][1])),
         chosen=chosen,
     )
 
 
-def _log_density(residual: Array, covariance: Array) -> float:
+def log_density(residual: Array, covariance: Array) -> float:
+    """Log density of a residual (n,) under N(0, covariance)."""
     factor = linalg.cho_factor(covariance, lower=True)
     log_det = 2.0 * float(np.sum(np.log(np.diagonal(factor[0]))))
     square = float(residual @ linalg.cho_solve(factor, residual))
@@ -106,8 +108,20 @@ def _predict(
     problem: Problem, found: Search, effects: Set, index: tuple[NDArray[np.intp], NDArray[np.intp]]
 ) -> tuple[Array, Array]:
     """Mean (h,) and covariance (h, h) of held-out readings: parameters, remainder and noise."""
-    fitted = found.fits[effects, found.best_size(effects)]
-    force, J = linearise(problem, fitted)
+    return predict_rows(problem, found.fits[effects, found.best_size(effects)], index)
+
+
+def predict_rows(
+    problem: Problem,
+    fitted: Fit,
+    index: tuple[NDArray[np.intp], NDArray[np.intp]],
+    blueprint: Blueprint | None = None,
+) -> tuple[Array, Array]:
+    """Mean (h,) and covariance (h, h) of the readings of some rows, given a fit to others.
+
+    ``index`` holds the fitted and the predicted rows; ``blueprint`` another simulation than the problem's.
+    """
+    force, J = linearise(problem, fitted, blueprint)
     train, held = index
     covariance = problem.covariance(SIZES[fitted.size])
     cross = covariance[np.ix_(held, train)]
@@ -119,9 +133,9 @@ def _predict(
     return mean, moved @ fitted.covariance @ moved.T + own
 
 
-def linearise(problem: Problem, fitted: Fit) -> tuple[Array, Array]:
+def linearise(problem: Problem, fitted: Fit, blueprint: Blueprint | None = None) -> tuple[Array, Array]:
     """Force (n,) and its Jacobian (n, d + p) at a fit, on all rows of a problem."""
-    chain = chain_for(problem.blueprint.model_dump_json(), fitted.effects)
+    chain = chain_for((blueprint or problem.blueprint).model_dump_json(), fitted.effects)
     n, d = len(problem), len(fitted.u)
     points = fitted.u + np.concatenate([np.zeros((1, d)), STEP * np.eye(d)])
     values = {q.name: q.prior.from_normal(points[:, i : i + 1]) for i, q in enumerate(chain.parameters)}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mpam_calib.design.draws import MuscleDraws, mean_force, quantile_force
 from mpam_calib.design.optimality import optimality
 from mpam_calib.design.problem import Function, Problem, case_one, case_two
-from mpam_calib.design.search import hybrid
+from mpam_calib.design.search import hybrid, refine
 from mpam_calib.model.model import Model
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.prediction.curves import LIMIT
@@ -61,6 +61,16 @@ class Design:
     held_by: tuple[str, ...]
 
     @property
+    def held(self) -> str:
+        """What holds the design back, in short."""
+        parts = []
+        for words in (" at its upper bound", " at its lower bound"):
+            at = [name.removesuffix(words) for name in self.held_by if name.endswith(words)]
+            parts += [f"{', '.join(at)}{words}"] if at else []
+        others = [name for name in self.held_by if not name.endswith(" bound")]
+        return "; ".join([*parts, *others]).replace("at its", "at").replace(" bound", "") or "nothing"
+
+    @property
     def without_root(self) -> float:
         """Share of draws whose force stays positive as far as is looked."""
         return float(np.mean(self.contraction >= LIMIT - 1e-9))
@@ -94,17 +104,21 @@ class Optimiser:
     def at(self, P: float) -> list[Design]:
         """Both cases by both methods at P (Pa).
 
-        Each search ends in a design; of all designs of a case that method is given the one which is
-        best over all draws, so that neither is beaten at its own aim by the other.
+        Each search over few draws ends in a design, which a gradient search over all draws refines. Of
+        all designs of a case a method is given the best by its own aim: none is beaten at it by the other.
         """
         found = []
         for case in (case_one, case_two):
-            problems = {m: case(P, objective=self.objective(m, P)) for m in METHODS}
-            finalists = [self._search(problem) for problem in problems.values()]
+            few = {m: case(P, objective=self.objective(m, P)) for m in METHODS}
+            all_draws = {m: case(P, objective=self.objective(m, P, self.many)) for m in METHODS}
+            finalists = [self._search(problem) for problem in few.values()]
+            pairs = zip(all_draws.values(), list(finalists), strict=True)
+            finalists += [refine(problem, start, "SQP").x for problem, start in pairs]
             forces = self.many.blocked_forces(P, np.stack(finalists))
             scores = {"posterior_mean": forces.mean(axis=-1), "q05": np.quantile(forces, 0.05, axis=-1)}
-            for method, problem in problems.items():
-                i = int(np.argmax(scores[method]))
+            for method, problem in all_draws.items():
+                allowed = [problem.feasible(x, 1e-6) for x in finalists]
+                i = int(np.argmax(np.where(allowed, scores[method], -np.inf)))
                 found.append(self._design(problem, P, method, finalists[i], forces[i]))
         return found
 

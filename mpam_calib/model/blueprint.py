@@ -49,7 +49,7 @@ class Blueprint(Value):
 
     ``stroke`` (m) is the largest recorded displacement, ``reach`` the largest contraction at each
     level, ``pulls_at`` (Pa) the lowest pressure with a clear pull, ``stroke_time`` (s) the median
-    duration of a stroke (None without loops).
+    duration of a stroke (None without loops) and ``reading_time`` (s) that between two readings.
     """
 
     simulation: Simulation
@@ -61,6 +61,7 @@ class Blueprint(Value):
     reach: tuple[float, ...]
     pulls_at: float
     stroke_time: float | None
+    reading_time: float
     branches: bool
     free_contraction: bool
     tensile_range: tuple[float, float] | None
@@ -108,6 +109,7 @@ def draw_blueprint(
         reach=tuple(float(r) for r in reach),
         pulls_at=_pulls_at(specimen),
         stroke_time=None if loops is None else _stroke_time(loops),
+        reading_time=0.0 if loops is None else max(float(np.median(np.diff(loops.time_s))), 1e-6),
         branches=any(p is not None and bool(np.any(np.abs(p.branch) == 1)) for p in parts),
         free_contraction=specimen.free_contraction is not None,
         tensile_range=_tensile_range(specimen),

@@ -87,7 +87,7 @@ def build_model(blueprint: Blueprint) -> Model:
     if setting is not None:
         extra.append(white_noise_parameter(setting))
         if blueprint.stroke_time is not None and options.correlated_noise:
-            extra += correlated_noise_parameters(setting, blueprint.stroke_time)
+            extra += correlated_noise_parameters(setting, blueprint.stroke_time, blueprint.reading_time)
         if blueprint.free_contraction:
             prior = LogNormal(0.003, 0.7)
             extra.append(Parameter(CONTRACTION_SD, prior, "noise of one contraction reading", "", ""))

@@ -17,10 +17,18 @@ def white_noise_parameter(setting: Setting) -> Parameter:
     return Parameter(WHITE, prior, "white noise of one force reading")
 
 
-def correlated_noise_parameters(setting: Setting, stroke_time: float) -> tuple[Parameter, ...]:
-    """An Ornstein-Uhlenbeck part; its time constant lies well below a stroke (longer is structure)."""
+def correlated_noise_parameters(
+    setting: Setting, stroke_time: float, reading_time: float
+) -> tuple[Parameter, ...]:
+    """An Ornstein-Uhlenbeck part; its time constant lies between two readings and well below a stroke.
+
+    Shorter it would be white noise, longer it would be structure.
+    """
+    shortest = 2.0 * reading_time
     median = 0.3 * (setting.force_sd or 0.003 * setting.force_scale)
     return (
         Parameter(CORRELATED, LogNormal(median, 1.0), "noise that lasts for a moment"),
-        Parameter(TIME, LogUniform(stroke_time / 5000.0, stroke_time / 30.0), "how long that moment is"),
+        Parameter(
+            TIME, LogUniform(shortest, max(stroke_time / 30.0, 2.0 * shortest)), "how long that moment is"
+        ),
     )

@@ -23,11 +23,15 @@ class Diagnostics:
 
     @property
     def converged(self) -> bool:
-        """R-hat and both ESS within their limits for every parameter."""
+        """Whether the default limits are met."""
+        return self.meets(ESS_WANTED)
+
+    def meets(self, ess_wanted: float) -> bool:
+        """R-hat within its limit and both ESS at least ``ess_wanted`` for every parameter."""
         return bool(
             np.all(self.rhat <= RHAT_LIMIT)
-            and np.all(self.ess_bulk >= ESS_WANTED)
-            and np.all(self.ess_tail >= ESS_WANTED)
+            and np.all(self.ess_bulk >= ess_wanted)
+            and np.all(self.ess_tail >= ess_wanted)
         )
 
 

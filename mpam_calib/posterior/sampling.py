@@ -103,7 +103,7 @@ def sample(
             name = f"block_{len(blocks):05d}"
             block: list[Block] | None = checkpoint.load(name) if checkpoint else None
             if block is None:
-                block = run(states, warm.mixture, BLOCK)
+                block = run(states, warm.mixture, min(BLOCK, max_steps))
                 if checkpoint:
                     checkpoint.save(name, block)
             states = [b.state for b in block]
@@ -113,7 +113,7 @@ def sample(
             steps = chain.shape[1]
             ess = float(min(figures.ess_bulk.min(), figures.ess_tail.min()))
             tell(Progress("sampling", steps, float(figures.rhat.max()), ess, min(ess / ess_wanted, 1.0)))
-            enough = figures.converged and ess >= ess_wanted
+            enough = figures.meets(ess_wanted)
             if enough or steps + BLOCK > max_steps:
                 break
     log_prob = np.concatenate([np.stack([b.log_prob for b in part]) for part in blocks], axis=1)

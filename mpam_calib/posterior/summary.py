@@ -58,5 +58,7 @@ def all_converged(summary: pd.DataFrame, sampling: Sampling, ess_wanted: float) 
     """Whether every row meets the limits, the derived ones included."""
     ess = summary[["ess_bulk", "ess_tail"]].to_numpy()
     return bool(
-        sampling.converged and (summary["rhat"].to_numpy() <= RHAT_LIMIT).all() and (ess >= ess_wanted).all()
+        sampling.diagnostics.meets(ess_wanted)
+        and (summary["rhat"].to_numpy() <= RHAT_LIMIT).all()
+        and (ess >= ess_wanted).all()
     )

@@ -30,6 +30,8 @@ COLUMNS = [
 DRAWS = 2000
 QUANTILES = [0.05, 0.25, 0.5, 0.75, 0.95]
 STRESS_POINTS = 101
+ROOTLESS = 0.05
+"""Share of curves without a root above which a free contraction is marked extrapolated."""
 
 
 def muscle_bands(model: Model, draws: Draws, pressures: Array, seed: int, trim: bool = True) -> pd.DataFrame:
@@ -63,9 +65,16 @@ def muscle_bands(model: Model, draws: Draws, pressures: Array, seed: int, trim: 
         parts.append(_blocked(curves, suffix, rng, outside))
         contraction = free
         if observed:
-            contraction = free + curves.contraction_noise[:, None] * rng.standard_normal(free.shape)
+            # The cell's noise moves the point where the force is read as zero.
+            shifted = curves.force[:, :, 2] + curves.noise[:, None, None] * rng.standard_normal(
+                (*free.shape, 1)
+            )
+            own = curves.contraction_noise[:, None] * rng.standard_normal(free.shape)
+            contraction = np.maximum(first_root(grid, shifted) + own, 0.0)
         table = _table(f"free_contraction{suffix}", pressures, np.zeros(1), "", contraction[:, :, None])
-        table["extrapolated"] = outside | (free.mean(axis=0) > limit * 1.02 + 1e-3)
+        # A curve that never reaches zero ends at the grid's edge: that is no free contraction.
+        rootless = np.mean(free >= grid[-1], axis=0) > ROOTLESS
+        table["extrapolated"] = outside | rootless | (free.mean(axis=0) > limit * 1.02 + 1e-3)
         parts.append(table.assign(contraction=np.nan))
     return pd.concat(parts, ignore_index=True)[COLUMNS]
 

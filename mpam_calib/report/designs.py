@@ -230,11 +230,11 @@ def _by_pressure(view: DesignsView) -> Section:
         free, free_band = _contraction(d.contraction)
         strands = (fixed(d.x[3] / MM, 2), f"{d.x[4]:.0f}") if len(d.x) == 5 else ("–", "–")
         geometry = (fixed(d.x[0] / MM, 3), fixed(d.x[1] / MM, 4), fixed(d.x[2] / DEG, 2))
-        printed, held = f"{view.printed[d.case][i]:.2f}", "; ".join(d.held_by) or "nothing"
-        outcome = (f"{force} ({force_band})", printed, f"{free} ({free_band})", held, bool(outside[i]))
+        printed = f"{view.printed[d.case][i]:.2f}"
+        outcome = (f"{force} ({force_band})", printed, f"{free} ({free_band})", d.held, bool(outside[i]))
         rows.append((d.case, d.P / KPA, AIMS[d.method], *geometry, *strands, *outcome))
     names = ["case", "kPa", "aim", "R mm", "t mm", "α °", "R_br mm", "n", "blocked force N"]
-    names += ["Table 3.5 N", "free contraction %", "held by", "pressure extrapolated"]
+    names += ["Table 3.5 N", "free contraction %", "held by", "extrapolated"]
     frame = pd.DataFrame(rows, columns=names)
     apart = sorted(
         {
@@ -342,8 +342,8 @@ def _bands(view: DesignsView) -> Section:
                 f"Case I subtracts the energy in the strands (Eq. 2.25, {strands}; E_br = {stiff}). Case II "
                 "leaves the strands as they are declared. Length at rest stays "
                 f"{blueprint.geometry.L0_mm:g} mm.\n\n"
-                f"The searches (differential evolution, then SQP) use {view.draws[0]} draws, the bands "
-                f"{view.draws[1]}."
+                f"The searches (differential evolution, then SQP) use {view.draws[0]} draws, their last "
+                f"refinement and the bands {view.draws[1]}."
             ),
             DataTable(
                 frame,

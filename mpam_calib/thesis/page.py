@@ -21,7 +21,7 @@ from mpam_calib.thesis import orders
 from mpam_calib.thesis.chapter3 import MONOFILAMENTS, SHORT, Chapter3, best_force, loss, strands_that_fit
 from mpam_calib.thesis.figures import muscles, optimisation
 from mpam_calib.thesis.ledger import MISPRINT, NOT_REPRODUCIBLE, REPRODUCED, Ledger
-from mpam_calib.thesis.posterior import MuscleBands, parameters, table_4_12
+from mpam_calib.thesis.posterior import MPAM2, MuscleBands, missing, parameters, strand_factors, table_4_12
 from mpam_calib.thesis.reproduction import Reproduction
 from mpam_calib.thesis.tables import NAMES, table
 
@@ -39,7 +39,7 @@ def page(result: Reproduction, bands: dict[str, MuscleBands] | None = None) -> P
             *_tables(result.ledger),
             _unprinted(result.ledger),
             _figures(result.chapter3, bands),
-            *([_comparison(bands)] if bands else []),
+            _comparison(bands),
         ],
         footer="S. Zabihollah, Modelling, Design Optimization, and Experimental Characterization of "
         "Miniaturized "
@@ -183,7 +183,9 @@ def _figures(chapter: Chapter3, bands: dict[str, MuscleBands]) -> Section:
         [
             Figure(muscles.outputs(bands), f"Blocked force and free contraction. {note}", "three panels"),
             Figure(muscles.order_selection(limits), "Orders, by relative least squares.", "curves"),
-            Figure(muscles.average_curves(), f"Decoded average curves. {note}", "force against contraction"),
+            Figure(
+                muscles.average_curves(bands), f"Decoded average curves. {note}", "force against contraction"
+            ),
             Figure(
                 muscles.modulus_laws(),
                 "Moduli (points) with the printed laws (dashed).",
@@ -196,29 +198,56 @@ def _figures(chapter: Chapter3, bands: dict[str, MuscleBands]) -> Section:
                 "error's minimum depends on how near to free contraction the loop is used.",
                 "error against f_s",
             ),
-            Figure(muscles.loops(), f"Loops by theory. {note}", "loops"),
+            Figure(muscles.loops(bands), f"Loops by theory. {note}", "loops"),
         ],
-        note="" if bands else "No calibrated run was given (--mpam1, --mpam2), so that no bands are drawn.",
+        note="Shaded: 90 % bands of the posteriors that were given (medians where drawn); the last section "
+        "says which are missing."
+        if bands
+        else "No calibrated run was given, so that no bands are drawn: the last section says how to add "
+        "them.",
     )
 
 
 def _comparison(bands: dict[str, MuscleBands]) -> Section:
-    words = (
-        "Printed beside the posterior's 90 % bands; the blocked force at 300 kPa needs a prediction to "
-        "that pressure "
-        "(mpam-calib predict RUN --pressure 50:300:50)."
-    )
-    constants = "The thesis's constants beside the posterior's (Tables 4.4, 4.10, Fig. 4.20)."
-    return Section(
-        "With a posterior",
-        [
+    """What posteriors say beside the print, and which of them were not given."""
+    blocks: list[Block] = []
+    if bands:
+        words = (
+            "Printed beside the posterior's 90 % bands; the blocked force at 300 kPa needs a prediction to "
+            "that pressure (mpam-calib predict RUN --pressure 50:300:50) and is extrapolated."
+        )
+        constants = "The thesis's constants beside the posterior's (Tables 4.4, 4.10, Fig. 4.20)."
+        blocks += [
             Notice(
                 "The runs are calibrations to reconstructed loops: they return what the loops were made from."
             ),
             DataTable(table_4_12(bands), f"Table 4.12. {words}"),
             DataTable(parameters(bands), constants),
-        ],
+        ]
+        if any(own.f_s is not None for own in bands.values()):
+            blocks += _strands(bands)
+    absent = missing(bands)
+    if len(absent):
+        told = "Parts that need a posterior and were given none, and the commands that add them."
+        blocks.append(DataTable(absent, told))
+    return Section("With a posterior" if bands else "Posteriors: none given", blocks)
+
+
+def _strands(bands: dict[str, MuscleBands]) -> list[Block]:
+    words = (
+        "f_s, the strands' friction, by least squares (200 kPa, to 0.98 of free contraction) and by "
+        "posterior. The thesis's least squares are relative to the force and run to its lower bound, 0.15; "
+        "the posterior weighs all levels by the noise."
     )
+    own = bands.get(MPAM2)
+    made = (
+        "MPAM2's loops were reconstructed with f_s = 0.15: its posterior returns that value and proves "
+        "nothing about the muscle. "
+        if own is not None and own.f_s is not None
+        else ""
+    )
+    coulomb = "MPAM1's loops carry the Coulomb friction of Table 4.10, and f_s is what comes nearest to it."
+    return [DataTable(strand_factors(bands), words), Text(made + coulomb)]
 
 
 def _formats() -> dict[str, str]:

@@ -27,17 +27,30 @@ COMPARED_AT = {"Blocked Force (N)": (300.0, 250.0), "Free Contraction (%)": (250
 """Pressures (kPa) at which Table 4.12 is compared: its title's, and the highest that was measured."""
 
 
+MPAM1, MPAM2, MPAM1_STRAND = "MPAM1", "MPAM2", "MPAM1, strand friction"
+"""The runs that the reproduction can show."""
+NEAR_KPA = 2.0
+"""A recorded level lies this near to its nominal pressure."""
+
+
 @dataclass(frozen=True)
 class MuscleBands:
-    """A calibrated muscle: the frames of its ``predictions.csv`` or ``bands.csv``, and ``summary.csv``."""
+    """A calibrated muscle: the frames of its ``predictions.csv`` or ``bands.csv``, and ``summary.csv``.
+
+    ``f_s`` holds the draws (draws,) of the strands' friction, None where the run has none.
+    """
 
     muscle: str
     bands: pd.DataFrame
     summary: pd.DataFrame
+    f_s: Array | None = None
 
     @classmethod
     def read(cls, muscle: str, run: Path) -> MuscleBands:
-        """Read a RUN folder; ``predictions.csv``, which can reach further, goes before ``bands.csv``."""
+        """Read a RUN folder; ``predictions.csv``, which can reach further, goes before ``bands.csv``.
+
+        Raises ``InputError`` where it is no finished run, or a run without the friction that is wanted.
+        """
         frames = []
         for name in ("predictions.csv", "bands.csv"):
             if (run / name).is_file():
@@ -46,7 +59,35 @@ class MuscleBands:
             raise InputError(run, "no summary.csv and bands.csv", "the RUN folder of a finished calibrate")
         keys = ["quantity", "pressure_kPa", "contraction", "branch"]
         bands = pd.concat(frames).drop_duplicates(keys).sort_values(["quantity", "pressure_kPa"])
-        return cls(muscle, bands.reset_index(drop=True), pd.read_csv(run / "summary.csv"))
+        summary = pd.read_csv(run / "summary.csv")
+        names = set(summary["parameter"])
+        if muscle == MPAM1_STRAND and "f_s" not in names:
+            raise InputError(run / "summary.csv", "no f_s", 'a run with friction = "strand"')
+        return cls(
+            muscle, bands.reset_index(drop=True), summary, _strand_draws(run) if "f_s" in names else None
+        )
+
+    @property
+    def coulomb(self) -> bool:
+        """Whether its declared friction is Coulomb's."""
+        return bool(self.summary["parameter"].str.startswith("K_f").any())
+
+    def curve(self, P_kPa: float, branch: str) -> pd.DataFrame:
+        """Rows of a force-contraction band at the pressure nearest to a level; empty where none is near."""
+        rows = self.bands[(self.bands["quantity"] == "force_N") & (self.bands["branch"] == branch)]
+        distance = (rows["pressure_kPa"] - P_kPa).abs()
+        near: pd.DataFrame = rows[(distance <= NEAR_KPA) & (distance == distance.min())]
+        return near.sort_values("contraction")
+
+
+def _strand_draws(run: Path) -> Array | None:
+    """Draws of f_s, (draws,), of a RUN folder; None where it holds no posterior."""
+    import arviz as az
+
+    if not (run / "posterior.nc").is_file():
+        return None
+    posterior = az.from_netcdf(str(run / "posterior.nc"), engine="h5netcdf")["posterior"]
+    return np.asarray(posterior["f_s"].to_numpy(), dtype=np.float64).ravel()
 
 
 def table_4_12(bands: dict[str, MuscleBands]) -> pd.DataFrame:
@@ -57,6 +98,8 @@ def table_4_12(bands: dict[str, MuscleBands]) -> pd.DataFrame:
     printed = table("4.12")
     rows = []
     for muscle, own in bands.items():
+        if muscle not in (MPAM1, MPAM2):
+            continue
         for column, (quantity, scale) in QUANTITIES.items():
             for P in COMPARED_AT[column]:
                 near = np.isclose(own.bands["pressure_kPa"], P, atol=1.0)
@@ -85,10 +128,10 @@ def _printed(muscle: str, parameter: str) -> str:
     name, _, level = parameter.partition("@")
     if name == "f_s":
         return f"{decoded.F_S:g}"
-    if muscle == "MPAM1" and name == "K_f" and level:
+    if muscle == MPAM1 and name == "K_f" and level:
         return table("4.10").text("K_f", f"{float(level):g} kPa")
     letter, _, k = name.partition("_")
-    if muscle == "MPAM1" and letter in ("a", "b") and k.isdigit() and int(k) <= 4:
+    if muscle != MPAM2 and letter in ("a", "b") and k.isdigit() and int(k) <= 4:
         return table("4.4").text(letter, f"E_{k}")
     return ""
 
@@ -110,3 +153,46 @@ def strand_factor(draws: Array) -> dict[str, float]:
         "matched_low": min(matched),
         "matched_high": max(matched),
     }
+
+
+def strand_factors(bands: dict[str, MuscleBands]) -> pd.DataFrame:
+    """Posterior of f_s of every run that has one, beside the thesis's 0.15 and least squares (Fig. 4.20)."""
+    squares = [friction.best_strand_factor(3, 0.98, relative) for relative in (True, False)]
+    rows = []
+    for muscle, own in bands.items():
+        if own.f_s is None:
+            continue
+        said = strand_factor(own.f_s)
+        fitted = squares if muscle != MPAM2 else [np.nan, np.nan]
+        matched = f"{said['matched_low']:.2f} to {said['matched_high']:.2f}" if muscle != MPAM2 else "–"
+        posterior = [said[name] for name in ("mean", "sd", "q05", "q95", "below_printed")]
+        rows.append((muscle, f"{decoded.F_S:g}", *fitted, matched, *posterior))
+    names = ["run", "printed", "relative least squares", "least squares", "matching K_f at γ = 0"]
+    names += ["posterior mean", "sd", "q05", "q95", "share below the print"]
+    return pd.DataFrame(rows, columns=names)
+
+
+MISSING = {
+    MPAM1: (
+        "bands in Fig. 4.7, 4.10, 4.14 and 4.22; Table 4.12 and 4.10 and 4.4 beside the posterior",
+        "mpam-calib calibrate datasets/mpam1_reconstructed -o RUN1; "
+        "mpam-calib predict RUN1 --pressure 50:300:50; mpam-calib reproduce -o DIR --mpam1 RUN1",
+    ),
+    MPAM2: (
+        "bands in Fig. 4.7, 4.10, 4.18 and 4.23; Table 4.12 beside the posterior; MPAM2's f_s by posterior",
+        "mpam-calib calibrate datasets/mpam2_reconstructed -o RUN2; "
+        "mpam-calib predict RUN2 --pressure 50:300:50; mpam-calib reproduce -o DIR --mpam2 RUN2",
+    ),
+    MPAM1_STRAND: (
+        "bands in Fig. 4.21; MPAM1's f_s by posterior (Fig. 4.20)",
+        'in a copy of datasets/mpam1_reconstructed set friction = "strand" and friction_by_pressure = false; '
+        "mpam-calib calibrate COPY -o RUN3; mpam-calib reproduce -o DIR --mpam1-strand RUN3",
+    ),
+}
+"""What each run would add, and the commands that add it."""
+
+
+def missing(bands: dict[str, MuscleBands]) -> pd.DataFrame:
+    """Parts of the reproduction that need a posterior and have none: ``run, what is missing, commands``."""
+    rows = [(name, *words) for name, words in MISSING.items() if name not in bands]
+    return pd.DataFrame(rows, columns=["run", "what is missing", "commands"])

@@ -9,7 +9,7 @@ import numpy as np
 from mpam_calib.report.figures import style
 from mpam_calib.thesis import decoded, friction, laws, orders
 from mpam_calib.thesis.chapter3 import force, three_models
-from mpam_calib.thesis.posterior import MuscleBands
+from mpam_calib.thesis.posterior import MPAM1, MPAM1_STRAND, MPAM2, MuscleBands
 from mpam_calib.thesis.statistics import least_squares
 from mpam_calib.thesis.tables import table
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Colour = tuple[float, float, float, float]
 COLOURS = {"MPAM1": style.BLUE, "MPAM2": style.VERMILLION}
 
 
@@ -77,8 +78,8 @@ def order_selection(limits: dict[str, float]) -> Figure:
     return figure
 
 
-def average_curves() -> Figure:
-    """Fig. 4.14 and 4.18: the decoded average curves of the five levels."""
+def average_curves(bands: dict[str, MuscleBands]) -> Figure:
+    """Fig. 4.14 and 4.18: the decoded average curves of the five levels, over the posterior's 90 % bands."""
     with style.applied():
         figure = style.new_figure(2.9)
         for ax, muscle, name in zip(figure.subplots(1, 2), decoded.MUSCLES, ("4.14", "4.18"), strict=True):
@@ -86,6 +87,7 @@ def average_curves() -> Figure:
             for P, E, level in zip(decoded.LEVELS, decoded.moduli(muscle), laws.P_KPA, strict=True):
                 gamma = np.linspace(0.0, decoded.first_root(float(P), E), 100)
                 ax.plot(gamma, decoded.force(P, gamma, E), color=shades[level], label=f"{level:.0f} kPa")
+                _force_band(ax, bands.get(muscle), float(level), "mean", shades[level])
             ax.set_title(f"Fig. {name}: {muscle}")
             _label(ax, "contraction γ", "force (N)")
     return figure
@@ -136,12 +138,15 @@ def strand_search() -> Figure:
     return figure
 
 
-def loops() -> Figure:
-    """Fig. 4.21-4.23: the theory's loops (solid: loading, dashed: unloading)."""
+def loops(bands: dict[str, MuscleBands]) -> Figure:
+    """Fig. 4.21-4.23: the theory's loops (solid: loading, dashed: unloading), over the posterior's bands."""
+    one = bands.get(MPAM1)
+    runs = (bands.get(MPAM1_STRAND), one if one is not None and one.coulomb else None, bands.get(MPAM2))
     with style.applied():
         figure = style.new_figure(2.9)
         cases = (("MPAM1", "strand", "4.21"), ("MPAM1", "coulomb", "4.22"), ("MPAM2", "strand", "4.23"))
-        for ax, (muscle, kind, name) in zip(figure.subplots(1, 3, sharey=True), cases, strict=True):
+        axes = figure.subplots(1, 3, sharey=True)
+        for ax, (muscle, kind, name), run in zip(axes, cases, runs, strict=True):
             shades = style.level_colours(list(laws.P_KPA))
             for i, (P, E) in enumerate(zip(decoded.LEVELS, decoded.moduli(muscle), strict=True)):
                 gamma = np.linspace(0.0, decoded.first_root(float(P), E), 100)
@@ -153,6 +158,8 @@ def loops() -> Figure:
                     ax.plot(
                         gamma, F + sign * loss, line, color=shades[laws.P_KPA[i]], linewidth=1.0, label=label
                     )
+                    branch = "loading" if sign > 0 else "unloading"
+                    _force_band(ax, run, float(laws.P_KPA[i]), branch, shades[laws.P_KPA[i]])
             ax.set_title(f"Fig. {name}: {muscle}, {kind}")
             _label(ax, "contraction γ", "force (N)" if name == "4.21" else "")
     return figure
@@ -164,6 +171,21 @@ def _band(ax: Axes, bands: MuscleBands | None, quantity: str, colour: str, scale
         return
     rows = bands.bands[bands.bands["quantity"] == quantity]
     style.band(ax, rows["pressure_kPa"].to_numpy(float), rows, colour, scale)
+
+
+def _force_band(ax: Axes, run: MuscleBands | None, P_kPa: float, branch: str, colour: Colour) -> None:
+    """The 90 % band of a force-contraction curve, where there is a run that has it."""
+    if run is None:
+        return
+    rows = run.curve(P_kPa, branch)
+    ax.fill_between(
+        rows["contraction"].to_numpy(float),
+        rows["q05"].to_numpy(float),
+        rows["q95"].to_numpy(float),
+        color=colour,
+        alpha=0.3,
+        linewidth=0,
+    )
 
 
 def _label(ax: Axes, x: str, y: str) -> None:

@@ -1,0 +1,31 @@
+"""``mpam-calib select SPECIMEN -o RUN``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mpam_calib.cli.app import app
+
+
+@app.command()
+def select(
+    specimen: Annotated[Path, typer.Argument(help="specimen folder or its specimen.toml")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="the RUN folder to write")],
+    seed: Annotated[int, typer.Option(help="seed of every random choice", min=0)] = 0,
+    replicates: Annotated[int, typer.Option(help="replicates of the confusion matrix", min=1)] = 8,
+) -> None:
+    """Rank orders, laws, frictions, kinematics and strain conventions by evidence and held-out levels."""
+    from mpam_calib.cli.progress import stage_progress
+    from mpam_calib.run.select import select_to_folder
+
+    with stage_progress() as tell:
+        found = select_to_folder(specimen, output, seed=seed, replicates=replicates, tell=tell)
+    best = found.models.iloc[0]
+    print(
+        f"first of {len(found.models)}: {best['kinematics']}, {best['strain']}, order {best['order']}, "
+        f"{best['law']}, {best['friction']} (probability {best['probability']:.3g})"
+    )
+    print(f"{output / 'report.html'} written")

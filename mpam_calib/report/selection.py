@@ -1,0 +1,64 @@
+"""The selection report: which simulation the data ask for, and whether they can tell."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from mpam_calib.criticism.select import Selection
+from mpam_calib.report.page import Block, DataTable, Headline, Page, Section, Text, Verdict
+from mpam_calib.specimen.recording import Specimen
+
+SHOWN = 20
+SURE = 0.95
+
+
+def short_name(row: pd.Series) -> str:
+    """One model in a few words."""
+    return f"{row['kinematics']}, {row['strain']}, M = {row['order']}, {row['law']}, {row['friction']}"
+
+
+def selection_page(found: Selection, specimen: Specimen) -> Page:
+    """The page for one selection."""
+    models = found.models
+    best = models.iloc[0]
+    together = models["probability"].cumsum().searchsorted(SURE) + 1
+    sure = float(best["probability"]) >= SURE
+    sentence = (
+        f"The data ask for {short_name(best)}."
+        if sure
+        else f"The data cannot tell: {together} models share {SURE:.0%} of the probability."
+    )
+    held = models.dropna(subset=["elpd_held_out"])
+    reasons = [f"the best model by evidence has probability {best['probability']:.3g}"]
+    if len(held):
+        winner = held.iloc[int(held["elpd_held_out"].to_numpy().argmax())]
+        same = "the same model" if winner.name == best.name else short_name(winner)
+        reasons.append(f"held-out pressure levels prefer {same}")
+    lead: list[Block] = [
+        Headline(sentence),
+        Verdict("Model selection", "good" if sure else "caution", reasons),
+    ]
+    names = [short_name(models.iloc[i]) for i in range(len(found.confusion))]
+    confusion = pd.DataFrame(found.confusion, columns=[str(i + 1) for i in range(len(names))])
+    confusion.insert(0, "simulated from", [f"{i + 1}: {name}" for i, name in enumerate(names)])
+    formats = {str(i + 1): "{:.2f}" for i in range(len(names))}
+    ranks = {
+        "log_evidence": "{:.1f}", "probability": "{:.3g}", "rmse_held_out_N": "{:.3g}",
+        "elpd_held_out": "{:.1f}", "elpd_held_out_se": "{:.1f}",
+    }  # fmt: skip
+    sections = [
+        Section(
+            "Ranking", [DataTable(models.drop(columns="log_evidence_se").head(SHOWN), "Best first", ranks)]
+        ),
+        Section(
+            "Would data like these tell them apart?",
+            [
+                Text(
+                    f"Each row: {found.replicates} sets of loops simulated from that model with this "
+                    "specimen's design and noise; the columns say how often each model was then ranked first."
+                ),
+                DataTable(confusion, "Confusion of the leading models", formats),
+            ],
+        ),
+    ]
+    return Page(specimen.name, "Model selection", lead, sections)

@@ -1,0 +1,32 @@
+"""``select`` from a specimen folder to a RUN folder: models.csv, report.html."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from mpam_calib.criticism.select import Selection, select
+from mpam_calib.errors import InputError
+from mpam_calib.report.selection import selection_page
+from mpam_calib.run.calibrate import resolve_material
+from mpam_calib.run.files import write_csv
+from mpam_calib.specimen import read
+
+
+def select_to_folder(
+    source: Path,
+    run: Path,
+    *,
+    seed: int = 0,
+    replicates: int = 8,
+    tell: Callable[[str, float], None] | None = None,
+) -> Selection:
+    """Rank the model space into a RUN folder; raises ``InputError`` before anything is written."""
+    specimen = read(source)
+    if run.exists() and not run.is_dir():
+        raise InputError(run, "a file", "a folder to write into, or a new name")
+    material = resolve_material(specimen)
+    found = select(specimen, seed=seed, replicates=replicates, material=material, tell=tell)
+    write_csv(found.models, run / "models.csv")
+    selection_page(found, specimen).write(run / "report.html")
+    return found

@@ -1,0 +1,145 @@
+"""Score ``diagnose`` on a set of hidden-effect cases: in tests/, ``python -m criticism.score locked``.
+
+Every case is one line of ``reports/score_<set>.csv``; a second run goes on where the first stopped. The
+rates that it prints are those of the issue, each with its binomial (Wilson) interval.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rig import case as rig_case
+from rig import margins, recipes, sets
+
+from mpam_calib.criticism.candidates import candidates
+from mpam_calib.criticism.problem import build_problem
+from mpam_calib.criticism.search import search
+from mpam_calib.criticism.verdict import judge
+from mpam_calib.model.blueprint import Options, draw_blueprint
+from mpam_calib.specimen import read
+
+FIELDS = ["name", "group", "truth", "outside", "word", "named", "listed", "probability"]
+LISTED = 5
+
+
+@dataclass(frozen=True)
+class Scored:
+    """One case: the truth, the verdict, the causes named and the sets listed (best first)."""
+
+    name: str
+    group: str
+    truth: frozenset[str]
+    outside: bool
+    word: str
+    named: frozenset[str]
+    listed: tuple[frozenset[str], ...]
+    probability: float
+
+
+def score_case(recipe: recipes.Recipe) -> Scored:
+    """Record one case, read it as a specimen folder, search and judge."""
+    one = recipes.build_case(recipe)
+    with tempfile.TemporaryDirectory() as folder:
+        rig_case.write_case(one, Path(folder) / "specimen", Path(folder) / "truth.json")
+        specimen = read(Path(folder) / "specimen")
+    problem = build_problem(specimen, draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
+    verdict = judge(search(problem, candidates(problem).tested))
+    best = list(verdict.probabilities.items())[:LISTED]
+    return Scored(
+        one.name, one.group, frozenset(one.ids), one.outside is not None, verdict.word,
+        verdict.standing, tuple(s for s, _ in best), best[0][1],
+    )  # fmt: skip
+
+
+def _joined(ids: frozenset[str]) -> str:
+    return "+".join(sorted(ids))
+
+
+def _row(s: Scored) -> list[str]:
+    listed = "|".join(_joined(ids) or "-" for ids in s.listed)
+    named = _joined(s.named)
+    return [
+        s.name,
+        s.group,
+        _joined(s.truth),
+        str(int(s.outside)),
+        s.word,
+        named,
+        listed,
+        f"{s.probability:.4f}",
+    ]
+
+
+def _parsed(row: dict[str, str]) -> Scored:
+    def ids(text: str) -> frozenset[str]:
+        return frozenset(text.split("+")) if text and text != "-" else frozenset()
+
+    return Scored(
+        row["name"], row["group"], ids(row["truth"]), row["outside"] == "1", row["word"], ids(row["named"]),
+        tuple(ids(t) for t in row["listed"].split("|")), float(row["probability"]),
+    )  # fmt: skip
+
+
+def wilson(hits: int, of: int) -> tuple[float, float]:
+    """95 % interval of a binomial rate."""
+    if of == 0:
+        return 0.0, 1.0
+    z, p = 1.96, hits / of
+    middle = (p + z**2 / (2 * of)) / (1 + z**2 / of)
+    half = z * np.sqrt(p * (1 - p) / of + z**2 / (4 * of**2)) / (1 + z**2 / of)
+    return float(middle - half), float(middle + half)
+
+
+def rates(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
+    """The issue's rates as (what, hits, of)."""
+    separable = {m.name for m in margins.read_margins(which) if m.separable}
+    clean = [s for s in scored if not s.outside]
+    sep = [s for s in clean if s.truth and s.name in separable]
+    other = [s for s in clean if s.truth and s.name not in separable]
+    null = [s for s in clean if not s.truth]
+    outside = [s for s in scored if s.outside]
+    return [
+        ("separable: exact set named", sum(s.word == "named" and s.named == s.truth for s in sep), len(sep)),
+        ("separable: truth ranked first", sum(s.listed[0] == s.truth for s in sep), len(sep)),
+        ("separable: wrong set named", sum(s.word == "named" and s.named != s.truth for s in sep), len(sep)),
+        ("not separable: truth among the listed", sum(s.truth in s.listed for s in other), len(other)),
+        (
+            "not separable: wrong set named",
+            sum(s.word == "named" and s.named != s.truth for s in other),
+            len(other),
+        ),
+        ("nothing hidden: nothing named", sum(s.word == "adequate" for s in null), len(null)),
+        ("outside: unexplained", sum(s.word == "unexplained" for s in outside), len(outside)),
+        ("outside: no false name", sum(s.named <= s.truth for s in outside), len(outside)),
+    ]
+
+
+def main(which: str, shard: int = 0, shards: int = 1, workers: int = 2) -> None:
+    """Score what is not scored yet, then print the rates of all that is."""
+    path = Path(__file__).parents[2] / "reports" / f"score_{which}.csv"
+    path.parent.mkdir(exist_ok=True)
+    done = list(csv.DictReader(path.open())) if path.exists() else []
+    names = {row["name"] for row in done}
+    todo = [r for r in sets.recipes(which)[shard::shards] if r.name not in names]
+    with path.open("a", newline="") as file, ProcessPoolExecutor(workers) as pool:
+        writer = csv.writer(file, lineterminator="\n")
+        if not done:
+            writer.writerow(FIELDS)
+        for scored in pool.map(score_case, todo):
+            writer.writerow(_row(scored))
+            file.flush()
+    everything = [_parsed(row) for row in csv.DictReader(path.open())]
+    for what, hits, of in rates(everything, which):
+        low, high = wilson(hits, of)
+        share = hits / of if of else float("nan")
+        print(f"{what:<40} {hits:>4} of {of:<4} {share:6.1%}  ({low:.1%} to {high:.1%})")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], *map(int, sys.argv[2:]))
