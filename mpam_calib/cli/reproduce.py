@@ -37,5 +37,6 @@ def reproduce(
     console.print(result.ledger.summary(), soft_wrap=True)
     absent = missing(bands)
     if len(absent):
-        console.print(f"without a posterior: {'; '.join(absent['run'])} (see the report's last section)")
+        names = "; ".join(absent["run"])
+        console.print(f"no posterior given of: {names} (the report's last section says how)", soft_wrap=True)
     console.print(f"see {out / 'report.html'}", soft_wrap=True)

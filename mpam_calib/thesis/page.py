@@ -198,7 +198,12 @@ def _figures(chapter: Chapter3, bands: dict[str, MuscleBands]) -> Section:
                 "error's minimum depends on how near to free contraction the loop is used.",
                 "error against f_s",
             ),
-            Figure(muscles.loops(bands), f"Loops by theory. {note}", "loops"),
+            Figure(
+                muscles.loops(bands),
+                f"Loops by theory, lines: f_s = 0.15 and Table 4.10's K_f. {note}"
+                + (" Shaded: 90 % bands, where not narrower than the lines." if bands else ""),
+                "loops",
+            ),
         ],
         note="Shaded: 90 % bands of the posteriors that were given (medians where drawn); the last section "
         "says which are missing."

@@ -183,7 +183,7 @@ def _force_band(ax: Axes, run: MuscleBands | None, P_kPa: float, branch: str, co
         rows["q05"].to_numpy(float),
         rows["q95"].to_numpy(float),
         color=colour,
-        alpha=0.3,
+        alpha=0.4,
         linewidth=0,
     )
 
