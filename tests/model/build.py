@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.model.blueprint import Blueprint, Options, draw_blueprint
+from mpam_calib.model.blueprint import Blueprint, MaterialPosterior, Options, draw_blueprint
 from mpam_calib.model.readings import Readings
 from mpam_calib.specimen.declaration import Braid, Csv, Fit, Geometry, Sensors, Simulation
 from mpam_calib.specimen.recording import Loops, Specimen
@@ -130,9 +130,13 @@ def take_levels(made: Specimen, kept: list[int]) -> Specimen:
 
 
 def blueprint(
-    simulation: dict[str, Any], options: Options | None = None, recorded: Loops | None = None, **parts: Any
+    simulation: dict[str, Any],
+    options: Options | None = None,
+    recorded: Loops | None = None,
+    material: MaterialPosterior | None = None,
+    **parts: Any,
 ) -> Blueprint:
     """The blueprint of a specimen whose loops all pull with 10 N."""
     made = specimen(simulation, recorded or loops(), **parts)
     assert made.loops is not None
-    return draw_blueprint(with_force(made, np.full(len(made.loops.time_s), 10.0)), options)
+    return draw_blueprint(with_force(made, np.full(len(made.loops.time_s), 10.0)), options, material)

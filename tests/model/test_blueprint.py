@@ -35,9 +35,7 @@ CASES = {
         tensile=TENSILE,
         fit=Fit(tensile_strain=(0.1, 1.3)),
     ),
-    "material": build.blueprint({"moduli": "run:../other", "order": 2, "law": "constant"}).model_copy(
-        update={"material": MATERIAL}
-    ),
+    "material": build.blueprint({"moduli": "run:../other", "order": 2, "law": "constant"}, material=MATERIAL),
 }
 
 

@@ -37,14 +37,17 @@ PARAMETERS = {
     "force_drift": "drift_N_per_min",
     "pressure_droop": "droop_percent",
     "rig_compliance": "compliance_mm_per_N",
+    "law_shape": "law_bend",
+    "order_too_low": "next_order",
 }
-"""The contract's table, without the two that change the law (law_shape, order_too_low)."""
+"""The contract's table; it leaves the names of the last two open."""
 STAGES = {
     Stage.RIG: {"dead_band", "pressure_droop", "length_offset", "rig_compliance"},
     Stage.SHAPE: {"braid_kinematics", "braid_angle", "tip_shape"},
-    Stage.STATICS: {"wall_pressure", "braid_stretch"},
+    Stage.STATICS: {"wall_pressure", "braid_stretch", "order_too_low"},
     Stage.FRICTION: {"coulomb_friction", "strand_friction", "rate_friction", "presliding"},
-    Stage.HISTORY: {"stress_softening", "creep"},
+    # A gain on the wall's stress is the history stage's to give, whatever it depends on.
+    Stage.HISTORY: {"stress_softening", "creep", "law_shape"},
     Stage.SENSOR: {"force_drift"},
 }
 OTHER_FRICTION = {"coulomb_friction": "strand", "strand_friction": "coulomb"}

@@ -65,15 +65,18 @@ def _log_weight(twin: Twin, K: Array, s: Array) -> tuple[Array, Array, Array]:
     log_weight = np.empty((len(K), len(s)))
     centre = np.empty((len(K), len(s), 4))
     spread = np.empty((len(K), len(s), 4))
+    # Force and columns are linear in K_f: two evaluations give them all.
+    ends = [twin.dense({"K_f": k, "noise_sd_N": 1.0}) for k in (0.0, 1.0)]
+    root = ends[0].root
     for i, k in enumerate(K):
-        dense = twin.dense({"K_f": float(k), "noise_sd_N": 1.0})
-        w, U = np.linalg.eigh(dense.A @ dense.A.T)
-        r, B = U.T @ (dense.y - dense.f), U.T @ dense.A
+        f, A = ((1.0 - k) * x + k * y for x, y in ((ends[0].f, ends[1].f), (ends[0].A, ends[1].A)))
+        w, U = np.linalg.eigh(A @ A.T)
+        r, B = U.T @ (ends[0].y - f), U.T @ A
         total = np.maximum(w, 0.0) + s[:, None] ** 2
         log_weight[i] = -0.5 * np.sum(r**2 / total + np.log(total), axis=1)
-        centre[i] = (r / total) @ B @ dense.root.T
+        centre[i] = (r / total) @ B @ root.T
         covariance = np.eye(4) - np.einsum("na,jn,nb->jab", B, 1.0 / total, B)
-        spread[i] = np.einsum("qa,jab,qb->jq", dense.root, covariance, dense.root)
+        spread[i] = np.einsum("qa,jab,qb->jq", root, covariance, root)
     log_weight += stats.halfnorm(scale=0.2).logpdf(K)[:, None]
     log_weight += stats.lognorm(0.7, scale=NOISE).logpdf(s)
     return log_weight - log_weight.max(), centre, spread
