@@ -1,0 +1,195 @@
+"""The model's chain at another geometry against an independent reckoning, and what a design is given."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mpam_calib.design.draws import MuscleDraws
+from mpam_calib.design.robust import COLUMNS, Design, Optimiser, designs_table
+from mpam_calib.model.blueprint import Blueprint, Options
+from mpam_calib.model.model import Model, build_model
+from mpam_calib.posterior.draws import Draws
+from mpam_calib.specimen.declaration import Braid, Geometry, GeometrySd, Sensors, Simulation
+from mpam_calib.units import DEG, MM
+
+from . import by_hand
+
+P = 200e3
+R, ALPHA = 3 * MM, 72 * DEG
+ROOT = np.sqrt(0.6)
+T_BEST = R * (1.0 - ROOT)
+F_BEST = P * np.pi * R**2 * (2.0 * ROOT * np.tan(ALPHA) ** 2 - 0.6)
+"""Closed form of Case II at 200 kPa: 79.58756 N."""
+X = np.array([2.4 * MM, 0.6 * MM, 66.0 * DEG])
+
+
+def model(sd: float = 0.0, braid: Braid | None = None, **declared: object) -> Model:
+    """A muscle of R 3 mm, t 0.7 mm, α 72°, with nothing but what is declared."""
+    told: dict[str, object] = {"effects": (), "friction": "none", "order": 2, "law": "constant"}
+    geometry = Geometry(L0_mm=50.0, R0_mm=3.0, t0_mm=0.7, alpha0_deg=72.0, sd=GeometrySd(alpha0_deg=sd))
+    return build_model(
+        Blueprint(
+            simulation=Simulation(**(told | declared)),  # type: ignore[arg-type]
+            geometry=geometry,
+            braid=braid,
+            sensors=Sensors(),
+            levels=(1e5, 2e5, 3e5),
+            stroke=0.015,
+            reach=(0.3, 0.3, 0.3),
+            pulls_at=1e5,
+            stroke_time=None,
+            reading_time=0.0,
+            branches=False,
+            free_contraction=False,
+            tensile_range=None,
+            options=Options(remainder=False, correlated_noise=False),
+        )
+    )
+
+
+def point(made: Model, count: int = 50, **values: np.ndarray) -> Draws:
+    """Draws at the middle of the prior with moduli of zero, but for what is given by name, (count,)."""
+    u = np.zeros((count, len(made.names)))
+    found = made.values(u) | {name: value[:, None] for name, value in values.items()}
+    return Draws(u, found, np.zeros((count, sum(made.linear_sizes))), 1)
+
+
+def designs(made: Model, draws: Draws, seed: int = 0) -> dict[tuple[str, str], Design]:
+    return {(d.case, d.method): d for d in Optimiser(made, draws, seed).at(P)}
+
+
+def test_a_point_posterior_gives_the_closed_form() -> None:
+    made = model(effects=("dead_band",), strain="stretch")
+    draws = point(made, P_DB_kPa=np.zeros(50))
+    assert pytest.approx(79.58756, abs=5e-6) == F_BEST
+    found = designs(made, draws)
+    for method in ("posterior_mean", "q05"):
+        two = found["II", method]
+        assert two.force == pytest.approx(F_BEST, abs=1e-5)
+        assert two.x == pytest.approx([R, T_BEST, ALPHA], rel=1e-6)
+        one = found["I", method]
+        assert one.x[3:] == pytest.approx([2.5 * MM, 100.0], rel=1e-5)
+        assert F_BEST - one.force == pytest.approx(0.00324, abs=2e-5)
+
+
+def test_the_pressure_that_does_no_work_is_taken_off() -> None:
+    made = model(effects=("dead_band",))
+    found = designs(made, point(made, P_DB_kPa=np.full(50, 50e3)))
+    assert found["II", "posterior_mean"].force == pytest.approx(0.75 * F_BEST, abs=1e-5)
+
+
+@pytest.mark.parametrize("strain", ["stretch", "engineering"])
+@pytest.mark.parametrize("kinematics", ["inextensible_braid", "constant_thickness"])
+def test_chain_at_another_geometry_is_the_reckoning_by_hand(strain: str, kinematics: str) -> None:
+    rng = np.random.default_rng(4)
+    # The angle before the tips: both act on the shape, in the order of their declaration.
+    effects = ("dead_band", "braid_angle", "tip_shape", "wall_pressure")
+    made = model(strain=strain, kinematics=kinematics, effects=effects)
+    given = {
+        "P_DB_kPa": rng.normal(15e3, 3e3, 20),
+        "tip_factor": rng.normal(0.9, 0.1, 20),
+        "delta_alpha_deg": rng.normal(0.5, 0.5, 20) * DEG,
+        "wall_factor": rng.normal(0.3, 0.1, 20),
+    }
+    draws = point(made, 20, **given)
+    draws = Draws(draws.u, draws.values, 0.1 * rng.standard_normal(draws.eta.shape), 1)
+    assert made.moduli is not None
+    moduli = made.moduli.coefficients(draws.eta, draws.values)
+    hand = by_hand.MuscleDraws.none(
+        P,
+        moduli,
+        kinematics=kinematics,
+        strain=strain,
+        dead_band=given["P_DB_kPa"],
+        tip_factor=given["tip_factor"],
+        delta_alpha=given["delta_alpha_deg"],
+        wall_factor=given["wall_factor"],
+    )
+    muscle = MuscleDraws.prepare(made, draws, 20, 0)
+    grid = np.linspace(0.0, 0.3, 31)
+    assert muscle.curves(P, X, grid) == pytest.approx(by_hand.forces_along(hand, X, grid), rel=1e-9)
+    assert muscle.blocked_forces(P, X) == pytest.approx(by_hand.blocked_forces(hand, X), rel=1e-9)
+    roots = muscle.free_contractions(P, X)
+    there = by_hand.free_contractions(hand, X, limit=0.6)
+    assert roots == pytest.approx(np.where(np.isnan(there), 0.6, there), abs=1e-3)
+
+
+@pytest.mark.parametrize("fitted", [False, True])
+def test_strands_of_case_one_are_the_design_s(fitted: bool) -> None:
+    braid = Braid(E_br_GPa=3.0, nu_s=0.33, R_br_mm=0.11, n=48)
+    made = model(braid=braid, effects=("braid_stretch",) if fitted else ())
+    draws = point(made, 5, **({"braid_factor": np.arange(5.0)} if fitted else {}))
+    muscle = MuscleDraws.prepare(made, draws, 5, 0)
+    five = np.stack([np.append(X, [0.12 * MM, 40.0]), np.append(X, [0.2 * MM, 60.0])])
+    rigid = by_hand.MuscleDraws.none(P, np.zeros((5, 1)), E_br=3e9)
+    with_loss, without = by_hand.blocked_forces(rigid, five), by_hand.blocked_forces(rigid, X)
+    share = np.arange(5.0) if fitted else np.ones(5)
+    assert muscle.blocked_forces(P, five) == pytest.approx(without + share * (with_loss - without), rel=1e-9)
+
+
+def test_bands_widen_with_the_sd_of_the_angle() -> None:
+    widths = []
+    for sd in (0.0, 0.5, 1.0):
+        made = model(sd)
+        draws = point(made, 200)
+        two = designs(made, draws)["II", "posterior_mean"]
+        widths.append(float(np.subtract(*np.quantile(two.force, [0.95, 0.05]))))
+        assert two.exact == pytest.approx(F_BEST, abs=1e-5)
+        assert (np.ptp(two.contraction) > 0.003) == (sd > 0.0)
+    # dF/F is 13 % a degree; the band spans 3.3 sd.
+    assert widths[0] < 1e-9 and widths[2] == pytest.approx(2.0 * widths[1], rel=0.1)
+    assert widths[2] == pytest.approx(3.29 * 0.125 * F_BEST, rel=0.1)
+
+
+def test_tested_muscle_s_own_angle_stays_with_it() -> None:
+    made = model(1.0)
+    assert "alpha0_deg" in made.names
+    off = point(made, 200, alpha0_deg=np.full(200, 60.0 * DEG))
+    assert designs(made, off)["II", "posterior_mean"].force.mean() == pytest.approx(F_BEST, rel=0.02)
+
+
+def test_careful_design_is_no_worse_in_what_it_is_careful_about() -> None:
+    rng = np.random.default_rng(0)
+    made = model(1.0, strain="stretch")
+    draws = point(made, 60)
+    # Moduli that turn over what a thicker wall does, in some draws.
+    eta = rng.normal(0.0, 0.6, draws.eta.shape)
+    found = designs(made, Draws(draws.u, draws.values, eta, 1))
+    for case in ("I", "II"):
+        mean, careful = found[case, "posterior_mean"], found[case, "q05"]
+        assert np.quantile(careful.force, 0.05) >= np.quantile(mean.force, 0.05)
+        assert mean.force.mean() >= careful.force.mean()
+    assert np.quantile(found["II", "q05"].force, 0.05) > np.quantile(
+        found["II", "posterior_mean"].force, 0.05
+    )
+
+
+def test_remainder_keeps_its_share_of_the_gas_force() -> None:
+    made = model(0.0)
+    with_remainder = build_model(
+        made.blueprint.model_copy(update={"options": Options(correlated_noise=False)})
+    )
+    draws = point(with_remainder, 3)
+    eta = np.random.default_rng(1).standard_normal(draws.eta.shape)
+    eta[:, : with_remainder.linear_sizes[0]] = 0.0
+    muscle = MuscleDraws.prepare(with_remainder, Draws(draws.u, draws.values, eta, 1), 3, 0)
+    plain = MuscleDraws.prepare(made, point(made, 3), 3, 0)
+    own = np.array([R, 0.7 * MM, ALPHA])
+
+    def gas(x: np.ndarray) -> float:
+        return float(x[0] ** 2 * (2 * np.tan(x[2]) ** 2 - 1))
+
+    left = [muscle.blocked_forces(P, x) - plain.blocked_forces(P, x) for x in (own, X)]
+    assert np.all(left[0] != 0.0)
+    assert left[1] == pytest.approx(left[0] * gas(X) / gas(own), rel=1e-9)
+
+
+def test_same_seed_same_table() -> None:
+    made = model(1.0)
+    draws = point(made, 100)
+    tables = [designs_table(Optimiser(made, draws, seed).at(P)) for seed in (0, 0, 1)]
+    assert list(tables[0].columns) == COLUMNS
+    assert tables[0].equals(tables[1]) and not tables[0].equals(tables[2])
+    assert list(tables[0]["case"]) == ["I", "I", "II", "II"]
+    assert tables[0]["n"].isna().tolist() == [False, False, True, True]
