@@ -11,7 +11,7 @@ import numpy as np
 from mpam_calib.criticism.budget import Budget, misfit_budget
 from mpam_calib.criticism.candidates import Candidates, candidates
 from mpam_calib.criticism.gain import Gain, measure_gain
-from mpam_calib.criticism.problem import Problem, build_problem
+from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.search import LARGEST, Search, Set, search
 from mpam_calib.criticism.verdict import LISTED, Verdict, judge
 from mpam_calib.errors import InputError
@@ -66,6 +66,8 @@ def diagnose(
     tested = candidates(problem)
     found = search(problem, tested.tested, lambda share: listener("searching", share))
     verdict = judge(found)
+    for size in range(len(SIZES)):
+        found.refit(verdict.standing, size)
     budget = misfit_budget(found, verdict.standing)
     gain = None
     if verdict.standing:

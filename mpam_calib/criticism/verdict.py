@@ -47,12 +47,12 @@ def judge(found: Search) -> Verdict:
     size = found.best_size(leading)
     structured = _structure_left(found, leading, size)
     if structured:
-        standing = _standing(found, leading, marginals)
+        standing = _standing(found, leading)
         return Verdict("unexplained", leading, standing, probabilities, marginals, size)
     if not leading and probabilities[leading] > 0.5:
         return Verdict("adequate", leading, frozenset(), probabilities, marginals, size)
     lead = scores[0] - scores[1] if len(scores) > 1 else np.inf
-    if leading and probabilities[leading] >= SURE and lead >= min(LEAD, _needed(found, sets)):
+    if leading and probabilities[leading] >= SURE and lead >= LEAD:
         return Verdict("named", leading, leading, probabilities, marginals, size)
     if not leading or (frozenset() in sets[:LISTED] and probabilities[frozenset()] > 1.0 - SURE):
         # Nothing is the likeliest, or cannot be excluded: no structure beyond the noise was shown.
@@ -60,11 +60,6 @@ def judge(found: Search) -> Verdict:
             "adequate", frozenset(), frozenset(), probabilities, marginals, found.best_size(frozenset())
         )
     return Verdict("ambiguous", leading, leading, probabilities, marginals, size)
-
-
-def _needed(found: Search, sets: list[Set]) -> float:
-    """The lead asked for: over every set that is not the leading one and more."""
-    return LEAD
 
 
 def _structure_left(found: Search, leading: Set, size: int) -> bool:
@@ -80,17 +75,23 @@ def _structure_left(found: Search, leading: Set, size: int) -> bool:
     return scale > NOISE_SIZE * noise
 
 
-def _standing(found: Search, leading: Set, marginals: dict[str, float]) -> Set:
-    """Causes of the leading set that stand beside any remainder by a clear margin."""
+def _standing(found: Search, leading: Set) -> Set:
+    """Causes of the leading set that stand beside the largest remainder, sure and by a clear margin.
+
+    A remainder that may hold anything is the fairest rival: what it can replace is no cause.
+    """
+    largest = len(SIZES) - 1
+    for e in leading:
+        found.refit(leading - {e}, largest)
+    scores = {
+        s: f.log_evidence + found.log_prior(s) for (s, size), f in found.fits.items() if size == largest
+    }
+    total = float(np.logaddexp.reduce(list(scores.values())))
     standing = set()
     for e in leading:
-        without = leading - {e}
-        if (without, len(SIZES) - 1) not in found.fits:
-            for size in range(len(SIZES)):
-                found.refit(without, size)
-        margin = found.score(leading) - found.score(without)
-        largest = [found.fits.get((s, len(SIZES) - 1)) for s in (leading, without)]
-        beside = largest[0].log_evidence - largest[1].log_evidence if all(largest) else -np.inf  # type: ignore[union-attr]
-        if marginals[e] >= SURE and margin >= LEAD and beside >= LEAD:
+        with_e = float(np.logaddexp.reduce([v for s, v in scores.items() if e in s]))
+        without = max(v for s, v in scores.items() if e not in s)
+        best = max(v for s, v in scores.items() if e in s)
+        if np.exp(with_e - total) >= SURE and best - without >= LEAD:
             standing.add(e)
     return frozenset(standing)

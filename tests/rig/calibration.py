@@ -38,8 +38,10 @@ class HyperelasticMuscle:
         """Axial and hoop stress less the radial one [N/mm2] at the stretches."""
         radial = 1.0 / (axial * hoop)
         if self.wall == "mooney_rivlin":
-            return (2.0 * (axial**2 - radial**2) * (self.C1 + self.C2 * hoop**2),
-                    2.0 * (hoop**2 - radial**2) * (self.C1 + self.C2 * axial**2))
+            return (
+                2.0 * (axial**2 - radial**2) * (self.C1 + self.C2 * hoop**2),
+                2.0 * (hoop**2 - radial**2) * (self.C1 + self.C2 * axial**2),
+            )
         first = axial**2 + hoop**2 + radial**2 - 3.0
         slope = 2.0 * (self.C1 + 2.0 * self.C2 * first)
         return slope * (axial**2 - radial**2), slope * (hoop**2 - radial**2)
@@ -86,8 +88,9 @@ def hyperelastic_muscle(seed: int) -> HyperelasticMuscle:
     drag, share, ratio = rng.uniform(0.01, 0.03), rng.uniform(0.02, 0.06), rng.uniform(0.05, 0.3)
 
     def made(c1: float) -> HyperelasticMuscle:
-        return HyperelasticMuscle(g, b, wall, c1, (ratio if wall == "mooney_rivlin" else 0.1 * ratio) * c1,
-                                  drag, share, top)
+        return HyperelasticMuscle(
+            g, b, wall, c1, (ratio if wall == "mooney_rivlin" else 0.1 * ratio) * c1, drag, share, top
+        )
 
     target = rng.uniform(0.65, 0.85) * made(1e-9).free_contraction(top)
     low, high = 1e-6, 5.0
@@ -122,17 +125,20 @@ def _table(header: str, *columns: Array) -> str:
     return "\n".join([header, *lines]) + "\n"
 
 
-def _toml(m: HyperelasticMuscle, name: str, noise: float, files: dict[str, str], strain: str,
-          order: int) -> str:
+def _toml(
+    m: HyperelasticMuscle, name: str, noise: float, files: dict[str, str], strain: str, order: int
+) -> str:
     g, b = m.geometry, m.braid
     listed = "\n".join(f'{k} = "{v}"' for k, v in files.items())
-    return (f'[specimen]\nname = "{name}"\n\n[geometry]\nL0_mm = {g.L0_mm!r}\nR0_mm = {g.R0_mm!r}\n'
-            f"t0_mm = {g.t0_mm!r}\nalpha0_deg = {g.alpha0_deg!r}\n\n[braid]\nE_br_GPa = {b.E_br_GPa!r}\n"
-            f"nu_s = {b.nu_s!r}\nR_br_mm = {b.R_br_mm!r}\nn = {b.n}\n\n"
-            f"[sensors]\nforce_sd_N = {noise:.4g}\n\n"
-            f'[files]\n{listed}\n\n[simulation]\nkinematics = "inextensible_braid"\nstrain = "{strain}"\n'
-            f'friction = "coulomb"\nfriction_by_pressure = false\neffects = []\nmoduli = "loops"\n'
-            f'order = {order}\nlaw = "linear"\n')
+    return (
+        f'[specimen]\nname = "{name}"\n\n[geometry]\nL0_mm = {g.L0_mm!r}\nR0_mm = {g.R0_mm!r}\n'
+        f"t0_mm = {g.t0_mm!r}\nalpha0_deg = {g.alpha0_deg!r}\n\n[braid]\nE_br_GPa = {b.E_br_GPa!r}\n"
+        f"nu_s = {b.nu_s!r}\nR_br_mm = {b.R_br_mm!r}\nn = {b.n}\n\n"
+        f"[sensors]\nforce_sd_N = {noise:.4g}\n\n"
+        f'[files]\n{listed}\n\n[simulation]\nkinematics = "inextensible_braid"\nstrain = "{strain}"\n'
+        f'friction = "coulomb"\nfriction_by_pressure = false\neffects = []\nmoduli = "loops"\n'
+        f'order = {order}\nlaw = "linear"\n'
+    )
 
 
 def _files(m: HyperelasticMuscle, levels: list[float], noise: float, seed: int) -> dict[str, str]:
@@ -150,8 +156,9 @@ def _files(m: HyperelasticMuscle, levels: list[float], noise: float, seed: int) 
 
     make: dict[str, Callable[[], str]] = {
         "loops": lambda: _loops(m, levels, noise, rng),
-        "force_map": lambda: _table("pressure_kPa,contraction,force_N", p, gamma,
-                                    noisy(m.force(p, gamma), noise)),
+        "force_map": lambda: _table(
+            "pressure_kPa,contraction,force_N", p, gamma, noisy(m.force(p, gamma), noise)
+        ),
         "blocked_force": lambda: _table("pressure_kPa,force_N", every, noisy(blocked, noise)),
         "free_contraction": lambda: _table("pressure_kPa,contraction", every, noisy(free, 5e-4)),
         "tensile": lambda: _table("strain,stress_Pa", strain, noisy(stress, 0.01 * float(stress.max()))),
@@ -159,8 +166,14 @@ def _files(m: HyperelasticMuscle, levels: list[float], noise: float, seed: int) 
     return {kind: text() for kind, text in make.items()}
 
 
-def write_calibration_case(seed: int, folder: Path, held_out: Path, kinds: tuple[str, ...] = ("loops",),
-                           strain: str = "engineering", order: int = 3) -> dict[str, Any]:
+def write_calibration_case(
+    seed: int,
+    folder: Path,
+    held_out: Path,
+    kinds: tuple[str, ...] = ("loops",),
+    strain: str = "engineering",
+    order: int = 3,
+) -> dict[str, Any]:
     """Write a specimen of `kinds` of files, and one with the held-out pressure levels; return the truth.
 
     Fitted levels are every other share of the highest, held-out ones those between: all inside the fitted
@@ -169,8 +182,14 @@ def write_calibration_case(seed: int, folder: Path, held_out: Path, kinds: tuple
     m = hyperelastic_muscle(seed)
     levels = [round(m.top_kPa * share, 1) for share in LEVEL_SHARES]
     noise = 0.003 * float(m.force(np.array(m.top_kPa), np.array(0.0)))
-    truth: dict[str, Any] = {"wall": m.wall, "C1_MPa": m.C1, "C2_MPa": m.C2, "noise_N": noise,
-                                "top_kPa": m.top_kPa, "levels": {}}
+    truth: dict[str, Any] = {
+        "wall": m.wall,
+        "C1_MPa": m.C1,
+        "C2_MPa": m.C2,
+        "noise_N": noise,
+        "top_kPa": m.top_kPa,
+        "levels": {},
+    }
     parts = ((Path(folder), levels[0::2], 0), (Path(held_out), levels[1::2], 1))
     for place, chosen, part in parts:
         place.mkdir(parents=True, exist_ok=True)
@@ -179,13 +198,17 @@ def write_calibration_case(seed: int, folder: Path, held_out: Path, kinds: tuple
         for kind, name in names.items():
             (place / name).write_text(texts[kind], encoding="utf-8")
         (place / "specimen.toml").write_text(
-            _toml(m, f"hyperelastic-{seed}", noise, names, strain, order), encoding="utf-8")
+            _toml(m, f"hyperelastic-{seed}", noise, names, strain, order), encoding="utf-8"
+        )
     curves = {}
     for level in levels:
         gamma = np.linspace(0.0, m.free_contraction(level), 41)
         p = np.full(gamma.size, level)
-        curves[level] = {"contraction": gamma.tolist(), "force_N": m.force(p, gamma).tolist(),
-                         "friction_N": m.friction(p, gamma).tolist(), "held_out": level in levels[1::2]}
+        curves[level] = {
+            "contraction": gamma.tolist(),
+            "force_N": m.force(p, gamma).tolist(),
+            "friction_N": m.friction(p, gamma).tolist(),
+            "held_out": level in levels[1::2],
+        }
     truth["levels"] = curves
     return truth
-

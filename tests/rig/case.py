@@ -93,15 +93,34 @@ def truth_of(recording: Recording) -> dict[str, Any]:
     case, p, sim = recording.case, recording.case.protocol, recording.case.muscle.simulation
     hidden = []
     for (f, size), (rms, left) in zip(case.effects, signatures(case, recording.rows), strict=True):
-        hidden.append({"id": f.id, "form": f.name, "shared": f.shared, "parameter": f.parameter,
-                       "value": size, "signature_rms_N": rms, "signature_left_rms_N": left})
+        hidden.append(
+            {
+                "id": f.id,
+                "form": f.name,
+                "shared": f.shared,
+                "parameter": f.parameter,
+                "value": size,
+                "signature_rms_N": rms,
+                "signature_left_rms_N": left,
+            }
+        )
     return {
-        "name": case.name, "seed": case.seed, "group": case.group, "ids": list(case.ids), "hidden": hidden,
+        "name": case.name,
+        "seed": case.seed,
+        "group": case.group,
+        "ids": list(case.ids),
+        "hidden": hidden,
         "outside": asdict(case.outside) if case.outside else None,
-        "noise": {"white_N": p.noise_N, "correlated_N": p.correlated_N, "correlation_s": p.correlation_s,
-                  "total_N": noise_sd(p)},
-        "friction": sim.friction, "friction_value": list(sim.friction_value),
-        "law": sim.law.name, "moduli": [list(row) for row in sim.law.constants],
+        "noise": {
+            "white_N": p.noise_N,
+            "correlated_N": p.correlated_N,
+            "correlation_s": p.correlation_s,
+            "total_N": noise_sd(p),
+        },
+        "friction": sim.friction,
+        "friction_value": list(sim.friction_value),
+        "law": sim.law.name,
+        "moduli": [list(row) for row in sim.law.constants],
         "reference_speed_mm_s": reference_speed(recording.rows),
         "true_force_N": [round(float(v), 6) for v in recording.true_force],
         "null_force_N": [round(float(v), 6) for v in recording.null_force],
@@ -111,24 +130,50 @@ def truth_of(recording: Recording) -> dict[str, Any]:
 def specimen_toml(case: Case, files: dict[str, str]) -> str:
     """The specimen file: what is declared, without anything hidden."""
     m, g, sim, p = case.muscle, case.muscle.geometry, case.muscle.simulation, case.protocol
-    lines = ["[specimen]", f'name = "{case.name}"', 'bladder_material = "silicone rubber"', "", "[geometry]",
-             f"L0_mm = {g.L0_mm!r}", f"R0_mm = {g.R0_mm!r}", f"t0_mm = {g.t0_mm!r}",
-             f"alpha0_deg = {g.alpha0_deg!r}", ""]
+    lines = [
+        "[specimen]",
+        f'name = "{case.name}"',
+        'bladder_material = "silicone rubber"',
+        "",
+        "[geometry]",
+        f"L0_mm = {g.L0_mm!r}",
+        f"R0_mm = {g.R0_mm!r}",
+        f"t0_mm = {g.t0_mm!r}",
+        f"alpha0_deg = {g.alpha0_deg!r}",
+        "",
+    ]
     if case.geometry_sd:
         lines += ["[geometry.sd]", *(f"{k} = {v!r}" for k, v in case.geometry_sd), ""]
     if m.braid is not None:
-        lines += ["[braid]", f"E_br_GPa = {m.braid.E_br_GPa!r}", f"nu_s = {m.braid.nu_s!r}",
-                  f"R_br_mm = {m.braid.R_br_mm!r}", f"n = {m.braid.n}", ""]
+        lines += [
+            "[braid]",
+            f"E_br_GPa = {m.braid.E_br_GPa!r}",
+            f"nu_s = {m.braid.nu_s!r}",
+            f"R_br_mm = {m.braid.R_br_mm!r}",
+            f"n = {m.braid.n}",
+            "",
+        ]
     lines += ["[sensors]", f"force_sd_N = {float(f'{noise_sd(p):.3g}')!r}"]
     if p.floor_N is not None:
         lines += [f"force_floor_N = {float(p.floor_N)!r}"]
-    lines += ["", "[files]", *(f'{k} = "{v}"' for k, v in files.items()), "", "[simulation]",
-              f'kinematics = "{sim.kinematics}"', f'strain = "{sim.strain}"', f'friction = "{sim.friction}"',
-              f"friction_by_pressure = {str(sim.friction_by_pressure).lower()}", "effects = []",
-              f'moduli = "{sim.source}"']
+    lines += [
+        "",
+        "[files]",
+        *(f'{k} = "{v}"' for k, v in files.items()),
+        "",
+        "[simulation]",
+        f'kinematics = "{sim.kinematics}"',
+        f'strain = "{sim.strain}"',
+        f'friction = "{sim.friction}"',
+        f"friction_by_pressure = {str(sim.friction_by_pressure).lower()}",
+        "effects = []",
+        f'moduli = "{sim.source}"',
+    ]
     if sim.source == "tensile":
-        lines += [f"E_Pa = [{', '.join(repr(float(e)) for e in sim.declared_E_Pa)}]",
-                  f"E_rel_sd = {sim.E_rel_sd!r}"]
+        lines += [
+            f"E_Pa = [{', '.join(repr(float(e)) for e in sim.declared_E_Pa)}]",
+            f"E_rel_sd = {sim.E_rel_sd!r}",
+        ]
     else:
         lines += [f"order = {sim.law.order}", f'law = "{sim.law.name}"']
     return "\n".join(lines) + "\n"
@@ -140,8 +185,10 @@ def loops_csv(recording: Recording) -> str:
     names = "time_s,pressure_kPa,displacement_mm,force_N,setpoint_kPa" + (",cycle,branch" if optional else "")
     out = [names]
     for i in range(rows.count):
-        line = (f"{rows.time[i]:.4f},{rows.reading[i]:.4f},{rows.displacement[i]:.6f},"
-                f"{recording.force[i]:.6f},{rows.setpoint[i]:.6g}")
+        line = (
+            f"{rows.time[i]:.4f},{rows.reading[i]:.4f},{rows.displacement[i]:.6f},"
+            f"{recording.force[i]:.6f},{rows.setpoint[i]:.6g}"
+        )
         if optional:
             line += f",{int(rows.cycle[i])},{'loading' if rows.direction[i] > 0 else 'unloading'}"
         out.append(line)

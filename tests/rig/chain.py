@@ -128,8 +128,9 @@ def _static(state: State, offset_deg: float) -> tuple[Array, Array]:
     return force, 1.0 - s.L / g.L0_mm
 
 
-def _pass(m: Muscle, rows: Rows, effects: Sequence[Sized], pressure: Array, seed: int,
-          force: Array) -> tuple[Array, Array]:
+def _pass(
+    m: Muscle, rows: Rows, effects: Sequence[Sized], pressure: Array, seed: int, force: Array
+) -> tuple[Array, Array]:
     """One evaluation with a given transmitted force: (transmitted force, load-cell reading)."""
     state = State(m, rows, seed, force, pressure, rows.displacement, rows.direction)
     for form, size in effects:
@@ -149,8 +150,9 @@ def _pass(m: Muscle, rows: Rows, effects: Sequence[Sized], pressure: Array, seed
     return total, total + state.sensor
 
 
-def force_of(m: Muscle, rows: Rows, effects: Sequence[Sized] = (), pressure: Array | None = None,
-             seed: int = 0) -> Array:
+def force_of(
+    m: Muscle, rows: Rows, effects: Sequence[Sized] = (), pressure: Array | None = None, seed: int = 0
+) -> Array:
     """Noise-free load-cell reading [N] per row; `pressure` [kPa] is what the muscle is given."""
     given = rows.pressure if pressure is None else pressure
     ordered = sorted(effects, key=lambda e: (STAGES.index(e[0].stage), e[0].id))

@@ -39,8 +39,10 @@ def row_of(recipe: Recipe) -> dict[str, str]:
         if suffix and not case.hidden:
             continue
         verdict = Oracle(record(one)).judge()
-        row |= {f"margin{suffix}": _round(verdict.margin),
-                f"superset_margin{suffix}": _round(verdict.superset_margin)}
+        row |= {
+            f"margin{suffix}": _round(verdict.margin),
+            f"superset_margin{suffix}": _round(verdict.superset_margin),
+        }
     return row
 
 

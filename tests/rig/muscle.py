@@ -187,8 +187,14 @@ def static_force(m: Muscle, pressure_kPa: Array | float, contraction: Array | fl
     return gas_force(p, s) + wall_force(s, polynomial_stress(E, z), polynomial_stress(E, x))
 
 
-def strand_friction(g: Geometry, b: Braid, pressure_kPa: Array, contraction: Array, power: float = 1.0 / 3.0,
-                    flat: bool = False) -> Array:
+def strand_friction(
+    g: Geometry,
+    b: Braid,
+    pressure_kPa: Array,
+    contraction: Array,
+    power: float = 1.0 / 3.0,
+    flat: bool = False,
+) -> Array:
     """|F_f| / f_s [N]: P 2 pi R0 L0 cos(a0) / sqrt(1 - sin^2(a0)(1-g)^2) / (1-g) / 0.69 (P(1-nu^2)/E)^power.
 
     Eq. 2.43 as printed for power 1/3. `flat` leaves out the change of the contact surface with contraction.

@@ -33,14 +33,17 @@ class Nuisance:
         """The muscle with the free numbers set (all 0: the muscle itself)."""
         sim = self.muscle.simulation
         frictions = len(sim.friction_value) if sim.friction != "none" else 0
-        friction = tuple(float(v + d) for v, d in zip(sim.friction_value, values[:frictions], strict=True)) \
-            if frictions else sim.friction_value
+        friction = (
+            tuple(float(v + d) for v, d in zip(sim.friction_value, values[:frictions], strict=True))
+            if frictions
+            else sim.friction_value
+        )
         rest = values[frictions:]
         if sim.source == "tensile":
             factor = 1.0 + float(rest[0])
             law = replace(sim.law, constants=_rows(factor * _flat(sim.law), sim.law))
             return self.muscle.with_simulation(friction_value=friction, law=law)
-        moved = _flat(sim.law) + self.basis @ rest[:self.basis.shape[1]]
+        moved = _flat(sim.law) + self.basis @ rest[: self.basis.shape[1]]
         rates = sim.law.rates
         if sim.law.name == "exponential":
             rates = (rates[0] * float(np.exp(rest[-2])), rates[1] * float(np.exp(rest[-1])))
@@ -54,7 +57,7 @@ def _flat(law: Law) -> Array:
 
 def _rows(flat: Array, law: Law) -> tuple[tuple[float, ...], ...]:
     width = len(law.constants[0])
-    return tuple(tuple(float(c) for c in flat[k * width:(k + 1) * width]) for k in range(law.order))
+    return tuple(tuple(float(c) for c in flat[k * width : (k + 1) * width]) for k in range(law.order))
 
 
 def nuisance_of(muscle: Muscle, rows: Rows, noise_N: float) -> Nuisance:
@@ -88,8 +91,7 @@ def nuisance_of(muscle: Muscle, rows: Rows, noise_N: float) -> Nuisance:
     return Nuisance(muscle, basis, np.array(sd), np.array(step))
 
 
-def differences(nuisance: Nuisance, at: Array, force: Array,
-                model: Callable[[Muscle], Array]) -> Array:
+def differences(nuisance: Nuisance, at: Array, force: Array, model: Callable[[Muscle], Array]) -> Array:
     """Forward differences (rows, count) of `model(muscle)` in the free numbers."""
     out = np.empty((force.size, nuisance.count))
     for j in range(nuisance.count):

@@ -140,8 +140,9 @@ class Oracle:
         sd = self._prior_sd(ids)
         return value - 0.5 * sum((sizes[i] / s) ** 2 for i, s in zip(ids, sd, strict=True))
 
-    def fit(self, ids: Key, start: dict[str, float] | None = None, free: Array | None = None,
-            steps: int = 12) -> Fit:
+    def fit(
+        self, ids: Key, start: dict[str, float] | None = None, free: Array | None = None, steps: int = 12
+    ) -> Fit:
         """Exact refit of one set by damped Gauss-Newton and its Laplace evidence."""
         ids = tuple(sorted(ids))
         fixed = {i: 1.0 for i in ids if i == "braid_kinematics"}
@@ -163,11 +164,13 @@ class Oracle:
             for ridge in (0.0, 0.03, 0.3, 3.0, 30.0, 300.0):
                 bent = normal + ridge * np.diag(np.diag(normal))
                 new = at + self._step(bent, scaled.T @ residual - at / sd, at / sd, moving) * sd
-                trial = {i: self._allowed(i, v) for i, v in zip(moving, new[free.size:], strict=True)} | fixed
-                force = self.force(trial, new[:free.size])
-                score = self._objective(force, trial, new[:free.size], moving)
+                trial = {
+                    i: self._allowed(i, v) for i, v in zip(moving, new[free.size :], strict=True)
+                } | fixed
+                force = self.force(trial, new[: free.size])
+                score = self._objective(force, trial, new[: free.size], moving)
                 if np.isfinite(score) and score > value:
-                    gain, value, base, sizes, free = score - value, score, force, trial, new[:free.size]
+                    gain, value, base, sizes, free = score - value, score, force, trial, new[: free.size]
                     break
             if gain < 0.02:
                 break

@@ -72,7 +72,7 @@ def _bursts(rows: Rows, rng: np.random.Generator) -> Array:
     """Bursts of outliers of either sign, a handful of rows each."""
     out = np.zeros(rows.count)
     for start in rng.integers(0, rows.count - 8, size=max(6, rows.count // 200)):
-        out[start:start + int(rng.integers(3, 8))] += rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.5)
+        out[start : start + int(rng.integers(3, 8))] += rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.5)
     return out
 
 
@@ -80,7 +80,7 @@ def _dropouts(rows: Rows, rng: np.random.Generator) -> Array:
     """One-sided drop-outs that recover exponentially."""
     out = np.zeros(rows.count)
     for start in rng.integers(0, rows.count - 12, size=max(6, rows.count // 250)):
-        out[start:start + 12] -= rng.uniform(0.5, 1.5) * np.exp(-np.arange(12) / 3.0)
+        out[start : start + 12] -= rng.uniform(0.5, 1.5) * np.exp(-np.arange(12) / 3.0)
     return out
 
 
@@ -95,13 +95,21 @@ def _jump(rows: Rows, rng: np.random.Generator) -> Array:
     inside = np.flatnonzero(rows.level == level)
     start = inside[int(rng.uniform(0.2, 0.6) * inside.size)]
     out = np.zeros(rows.count)
-    out[start:start + max(8, inside.size // 9)] = 1.0
+    out[start : start + max(8, inside.size // 9)] = 1.0
     return out
 
 
 ADDITIVE: dict[str, Callable[[Rows, np.random.Generator], Array]] = {
-    "bump": _bump, "notch": _notch, "ripple": _ripple, "gear": _gear, "stick_slip": _stick_slip,
-    "pressure_kink": _pressure_kink, "snag": _snag, "bursts": _bursts, "dropouts": _dropouts, "hum": _hum,
+    "bump": _bump,
+    "notch": _notch,
+    "ripple": _ripple,
+    "gear": _gear,
+    "stick_slip": _stick_slip,
+    "pressure_kink": _pressure_kink,
+    "snag": _snag,
+    "bursts": _bursts,
+    "dropouts": _dropouts,
+    "hum": _hum,
     "jump": _jump,
 }
 
@@ -130,8 +138,9 @@ READOUT = ("clip", "floor_clip", "compress", "quantisation")
 KINDS: tuple[str, ...] = (*ADDITIVE, *READOUT)
 
 
-def _solved(apply: Callable[[Array, float], Array], signal: Array, low: float, high: float,
-            rms_N: float) -> float:
+def _solved(
+    apply: Callable[[Array, float], Array], signal: Array, low: float, high: float, rms_N: float
+) -> float:
     """Setting between `low` (small change) and `high` (large) whose change has the wanted rms; bisection."""
     for _ in range(50):
         middle = 0.5 * (low + high)

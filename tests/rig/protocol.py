@@ -74,8 +74,9 @@ class Rows:
         return self.displacement / self.stroke
 
 
-def _half_stroke(motion: str, speed: float, stroke: float, dwell: float,
-                 dt: float) -> tuple[Array, Array, float]:
+def _half_stroke(
+    motion: str, speed: float, stroke: float, dwell: float, dt: float
+) -> tuple[Array, Array, float]:
     """Times within one half cycle, way covered [0..stroke], and its duration; `speed` is the mean speed."""
     duration = stroke / speed
     # Half a step off the reversal: what friction does at the very turn is not defined.
@@ -95,8 +96,11 @@ def _sampling_step(p: Protocol, strokes: list[float]) -> float:
     """Sampling interval [s], thinned by a whole factor until the rows fit."""
     for factor in range(1, 10_000):
         dt = factor / p.sampling_hz
-        rows = sum(2 * p.cycles * int(np.ceil((s / v + p.dwell_s) / _step(dt, s, v) + 1e-9))
-                   for s in strokes for v in p.speeds_mm_s)
+        rows = sum(
+            2 * p.cycles * int(np.ceil((s / v + p.dwell_s) / _step(dt, s, v) + 1e-9))
+            for s in strokes
+            for v in p.speeds_mm_s
+        )
         if rows <= p.rows_max or dt > max(strokes):
             return dt
     raise ValueError("rows cannot be thinned enough")
@@ -123,13 +127,22 @@ def record_rows(p: Protocol, muscle: Muscle, seed: int) -> Rows:
                 cycle += 1
                 for direction in (-1.0, 1.0):
                     ones = np.ones(times.size)
-                    parts.append({
-                        "time": clock + times, "setpoint": level * ones, "level": j * ones,
-                        "displacement": way if direction < 0 else stroke - way,
-                        "direction": direction * ones, "speed": pace, "nominal_speed": speed * ones,
-                        "since_reversal": way, "travel": travelled + way, "stroke": stroke * ones,
-                        "cycle": cycle * ones, "level_time": clock + times - start,
-                    })
+                    parts.append(
+                        {
+                            "time": clock + times,
+                            "setpoint": level * ones,
+                            "level": j * ones,
+                            "displacement": way if direction < 0 else stroke - way,
+                            "direction": direction * ones,
+                            "speed": pace,
+                            "nominal_speed": speed * ones,
+                            "since_reversal": way,
+                            "travel": travelled + way,
+                            "stroke": stroke * ones,
+                            "cycle": cycle * ones,
+                            "level_time": clock + times - start,
+                        }
+                    )
                     clock += duration
                     travelled += stroke
         clock += p.pause_s

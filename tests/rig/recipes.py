@@ -73,8 +73,9 @@ def _muscle(recipe: Recipe, rng: random.Random) -> tuple[Muscle, tuple[float, ..
         if recipe.moduli == "tensile":
             muscle, top = tensile_muscle(family, fork, recipe.friction, recipe.kinematics, recipe.order)
         else:
-            muscle, top = loops_muscle(family, fork, recipe.law, recipe.order, recipe.friction, recipe.strain,
-                                       shares)
+            muscle, top = loops_muscle(
+                family, fork, recipe.law, recipe.order, recipe.friction, recipe.strain, shares
+            )
         levels = whole_levels(shares, top)
         if sensible(muscle, levels):
             return muscle, levels
@@ -87,17 +88,28 @@ def _protocol(recipe: Recipe, muscle: Muscle, levels: tuple[float, ...], rng: ra
     slow = 0.25 * muscle.geometry.L0_mm / rng.uniform(8.0, 25.0)
     speeds = [slow * rng.uniform(4.0, 9.0) ** j for j in range(recipe.speeds)]
     return Protocol(
-        levels, recipe.cycles, tuple(float(f"{v:.3g}") for v in speeds),
+        levels,
+        recipe.cycles,
+        tuple(float(f"{v:.3g}") for v in speeds),
         dwell_s=rng.uniform(1.0, 3.0) if recipe.dwell else 0.0,
-        sampling_hz=rng.choice((10.0, 20.0, 50.0, 100.0)), rows_max=recipe.rows_max, motion=recipe.motion,
-        stroke_fraction=1.04 if recipe.floor else rng.uniform(0.75, 0.88), pause_s=rng.uniform(5.0, 40.0),
-        noise_N=noise, correlated_N=noise * rng.uniform(0.3, 0.7), correlation_s=rng.uniform(0.05, 0.3),
-        pressure_noise_kPa=0.1 * noise * levels[-1] / blocked, pressure_wander=rng.uniform(0.0, 0.004),
-        floor_N=0.0 if recipe.floor else None, branch_column=recipe.columns or recipe.dwell)
+        sampling_hz=rng.choice((10.0, 20.0, 50.0, 100.0)),
+        rows_max=recipe.rows_max,
+        motion=recipe.motion,
+        stroke_fraction=1.04 if recipe.floor else rng.uniform(0.75, 0.88),
+        pause_s=rng.uniform(5.0, 40.0),
+        noise_N=noise,
+        correlated_N=noise * rng.uniform(0.3, 0.7),
+        correlation_s=rng.uniform(0.05, 0.3),
+        pressure_noise_kPa=0.1 * noise * levels[-1] / blocked,
+        pressure_wander=rng.uniform(0.0, 0.004),
+        floor_N=0.0 if recipe.floor else None,
+        branch_column=recipe.columns or recipe.dwell,
+    )
 
 
-def _left_rms(f: Form, size: float, muscle: Muscle, rows: Rows, null: Array, columns: Array, noise: float,
-              seed: int) -> float:
+def _left_rms(
+    f: Form, size: float, muscle: Muscle, rows: Rows, null: Array, columns: Array, noise: float, seed: int
+) -> float:
     change = force_of(muscle, rows, [(f, size)], seed=seed) - null
     left = left_over(change, columns, nuisance_of(muscle, rows, noise), noise)
     return float(np.sqrt(np.mean(left**2)))
@@ -123,8 +135,9 @@ def solved_size(wanted: Wanted, muscle: Muscle, rows: Rows, noise: float, seed: 
     return float(f"{sign * size * unit:.4g}")
 
 
-def _stopped_at_zero_force(p: Protocol, muscle: Muscle, rows: Rows, hidden: tuple[Hidden, ...],
-                           recipe: Recipe) -> Protocol:
+def _stopped_at_zero_force(
+    p: Protocol, muscle: Muscle, rows: Rows, hidden: tuple[Hidden, ...], recipe: Recipe
+) -> Protocol:
     """Nobody pushes a muscle together: strokes end before the true force (friction and all) is zero."""
     if recipe.floor:
         return p
@@ -148,8 +161,9 @@ def build_case(recipe: Recipe) -> Case:
     protocol = _protocol(recipe, muscle, levels, rng)
     rows = record_rows(protocol, muscle, recipe.seed)
     noise = noise_sd(protocol)
-    hidden = tuple(Hidden(w.id, w.form, solved_size(w, muscle, rows, noise, recipe.seed))
-                   for w in recipe.effects)
+    hidden = tuple(
+        Hidden(w.id, w.form, solved_size(w, muscle, rows, noise, recipe.seed)) for w in recipe.effects
+    )
     protocol = _stopped_at_zero_force(protocol, muscle, rows, hidden, recipe)
     outside = Outside(recipe.outside, recipe.outside_multiple * noise) if recipe.outside else None
     return Case(recipe.name, recipe.seed, recipe.group, muscle, protocol, hidden, outside)

@@ -17,10 +17,25 @@ from typing import Any
 from .effects import IDS, shared_form
 from .recipes import Recipe, Wanted
 
-HISTORY_AND_RIG = ("stress_softening", "creep", "force_drift", "rate_friction", "presliding",
-                   "rig_compliance", "pressure_droop", "length_offset")
-STATIC = ("tip_shape", "wall_pressure", "law_shape", "order_too_low", "braid_angle", "dead_band",
-          "braid_stretch")
+HISTORY_AND_RIG = (
+    "stress_softening",
+    "creep",
+    "force_drift",
+    "rate_friction",
+    "presliding",
+    "rig_compliance",
+    "pressure_droop",
+    "length_offset",
+)
+STATIC = (
+    "tip_shape",
+    "wall_pressure",
+    "law_shape",
+    "order_too_low",
+    "braid_angle",
+    "dead_band",
+    "braid_stretch",
+)
 
 
 @dataclass(frozen=True)
@@ -36,29 +51,60 @@ class Half:
 
 
 DEVELOP_HALF = Half(
-    "develop", 4101, ("pencil", "thumb", "stub"),
-    {"dead_band": ("softplus",), "pressure_droop": ("quadratic",), "length_offset": ("settling",),
-     "rig_compliance": ("toe",), "tip_shape": ("cosine",), "braid_kinematics": ("centreline",),
-     "braid_angle": ("two_families",), "braid_stretch": ("crimped",), "wall_pressure": ("thinning",),
-     "law_shape": ("saturating", "knee"), "order_too_low": ("second_next",), "strand_friction": ("flat",),
-     "coulomb_friction": ("drag",), "rate_friction": ("viscous",), "presliding": ("tanh",),
-     "stress_softening": ("first_only", "contraction"), "creep": ("power", "two_times"),
-     "force_drift": ("thermal",)},
+    "develop",
+    4101,
+    ("pencil", "thumb", "stub"),
+    {
+        "dead_band": ("softplus",),
+        "pressure_droop": ("quadratic",),
+        "length_offset": ("settling",),
+        "rig_compliance": ("toe",),
+        "tip_shape": ("cosine",),
+        "braid_kinematics": ("centreline",),
+        "braid_angle": ("two_families",),
+        "braid_stretch": ("crimped",),
+        "wall_pressure": ("thinning",),
+        "law_shape": ("saturating", "knee"),
+        "order_too_low": ("second_next",),
+        "strand_friction": ("flat",),
+        "coulomb_friction": ("drag",),
+        "rate_friction": ("viscous",),
+        "presliding": ("tanh",),
+        "stress_softening": ("first_only", "contraction"),
+        "creep": ("power", "two_times"),
+        "force_drift": ("thermal",),
+    },
     ("bump", "ripple", "pressure_kink", "bursts", "clip", "floor_clip"),
-    {"null": 24, "separable": 42, "inseparable": 14, "outside": 14})
+    {"null": 24, "separable": 42, "inseparable": 14, "outside": 14},
+)
 
 LOCKED_HALF = Half(
-    "locked", 90210, ("needle", "arm", "finger"),
-    {"dead_band": ("closing_gap",), "pressure_droop": ("cosine", "root"), "length_offset": ("scale",),
-     "rig_compliance": ("hertz", "progressive"), "tip_shape": ("elliptic", "conical"),
-     "braid_kinematics": ("packed",), "braid_angle": ("bedding",), "braid_stretch": ("balance",),
-     "wall_pressure": ("lame", "seating"), "law_shape": ("power", "sigmoid"),
-     "order_too_low": ("exponential", "gent"), "strand_friction": ("plastic", "soft"),
-     "coulomb_friction": ("sublinear", "pressure_bound"), "rate_friction": ("power", "stribeck"),
-     "presliding": ("dahl", "slip", "lugre"), "stress_softening": ("power", "travel"),
-     "creep": ("stretched", "standard_solid"), "force_drift": ("late", "wander")},
+    "locked",
+    90210,
+    ("needle", "arm", "finger"),
+    {
+        "dead_band": ("closing_gap",),
+        "pressure_droop": ("cosine", "root"),
+        "length_offset": ("scale",),
+        "rig_compliance": ("hertz", "progressive"),
+        "tip_shape": ("elliptic", "conical"),
+        "braid_kinematics": ("packed",),
+        "braid_angle": ("bedding",),
+        "braid_stretch": ("balance",),
+        "wall_pressure": ("lame", "seating"),
+        "law_shape": ("power", "sigmoid"),
+        "order_too_low": ("exponential", "gent"),
+        "strand_friction": ("plastic", "soft"),
+        "coulomb_friction": ("sublinear", "pressure_bound"),
+        "rate_friction": ("power", "stribeck"),
+        "presliding": ("dahl", "slip", "lugre"),
+        "stress_softening": ("power", "travel"),
+        "creep": ("stretched", "standard_solid"),
+        "force_drift": ("late", "wander"),
+    },
     ("notch", "gear", "stick_slip", "snag", "dropouts", "hum", "jump", "compress", "quantisation"),
-    {"null": 66, "separable": 120, "inseparable": 40, "outside": 40})
+    {"null": 66, "separable": 120, "inseparable": 40, "outside": 40},
+)
 
 
 def _wanted(half: Half, rng: random.Random, effect: str, low: float, high: float) -> Wanted:
@@ -73,10 +119,17 @@ def _base(half: Half, rng: random.Random, group: str, design: str, index: int, *
         "name": f"{half.name}-{group}-{index:03d}",
         # The last six digits are the set's own, so that the two sets never share a seed.
         "seed": half.seed * 1000 % 1_000_000 + rng.getrandbits(20) * 1_000_000,
-        "group": group, "design": design, "family": rng.choice(half.families), "moduli": "tensile",
-        "levels": rng.choice((5, 6, 7)), "cycles": 3, "speeds": rng.choice((1, 2)),
-        "rows_max": rng.choice((1000, 1500, 2000, 3000)), "order": rng.choice((1, 2, 3)),
-        "motion": rng.choice(("triangle", "triangle", "sine")), "dwell": rng.random() < 0.25,
+        "group": group,
+        "design": design,
+        "family": rng.choice(half.families),
+        "moduli": "tensile",
+        "levels": rng.choice((5, 6, 7)),
+        "cycles": 3,
+        "speeds": rng.choice((1, 2)),
+        "rows_max": rng.choice((1000, 1500, 2000, 3000)),
+        "order": rng.choice((1, 2, 3)),
+        "motion": rng.choice(("triangle", "triangle", "sine")),
+        "dwell": rng.random() < 0.25,
         "columns": rng.random() < 0.7,
     }
     return Recipe(**(made | fields))
@@ -104,15 +157,26 @@ def _suited(effects: tuple[Wanted, ...], rng: random.Random) -> dict[str, Any]:
 def _loops_fields(rng: random.Random) -> dict[str, Any]:
     """A declared simulation with free moduli."""
     if rng.random() < 0.3:
-        return {"moduli": "loops", "law": "linear", "order": 4, "strain": "stretch",
-                "kinematics": "constant_thickness"}
-    return {"moduli": "loops", "law": rng.choice(("linear", "linear", "free", "constant")),
-            "order": rng.choice((2, 3))}
+        return {
+            "moduli": "loops",
+            "law": "linear",
+            "order": 4,
+            "strain": "stretch",
+            "kinematics": "constant_thickness",
+        }
+    return {
+        "moduli": "loops",
+        "law": rng.choice(("linear", "linear", "free", "constant")),
+        "order": rng.choice((2, 3)),
+    }
 
 
 def _null(half: Half, rng: random.Random, index: int) -> Recipe:
-    fields: dict[str, Any] = {"levels": rng.choice((3, 4, 5, 6, 8)), "cycles": rng.choice((1, 2, 3)),
-                                 "friction": rng.choice(("coulomb", "coulomb", "strand", "none"))}
+    fields: dict[str, Any] = {
+        "levels": rng.choice((3, 4, 5, 6, 8)),
+        "cycles": rng.choice((1, 2, 3)),
+        "friction": rng.choice(("coulomb", "coulomb", "strand", "none")),
+    }
     if rng.random() < 0.45:
         fields |= _loops_fields(rng)
     elif rng.random() < 0.3:
@@ -146,8 +210,9 @@ def _inseparable(half: Half, rng: random.Random, index: int) -> Recipe:
         effects = tuple(_wanted(half, rng, i, 0.3, 1.5) for i in ids)
         fields = {"moduli": "loops", "law": "linear", "order": 4}
     elif design == "short":  # one cycle, one speed, few levels
-        ids = rng.sample(("stress_softening", "creep", "force_drift", "pressure_droop", "presliding",
-                          "dead_band"), 2)
+        ids = rng.sample(
+            ("stress_softening", "creep", "force_drift", "pressure_droop", "presliding", "dead_band"), 2
+        )
         ids = ["creep" if i == "stress_softening" else i for i in ids]
         effects = tuple(_wanted(half, rng, i, 0.1, 0.5) for i in sorted(set(ids)))
         fields = {"cycles": 1, "speeds": 1, "levels": rng.choice((1, 2, 3))}
@@ -155,9 +220,16 @@ def _inseparable(half: Half, rng: random.Random, index: int) -> Recipe:
         pool = [i for i in STATIC + HISTORY_AND_RIG if i != "presliding"]
         effects = (_wanted(half, rng, rng.choice(pool), 0.01, 0.03),)
     else:  # effects that mimic each other, small
-        pair = rng.choice((("braid_angle", "dead_band"), ("length_offset", "rig_compliance"),
-                           ("braid_angle", "wall_pressure"), ("length_offset", "tip_shape"),
-                           ("creep", "stress_softening"), ("law_shape", "order_too_low")))
+        pair = rng.choice(
+            (
+                ("braid_angle", "dead_band"),
+                ("length_offset", "rig_compliance"),
+                ("braid_angle", "wall_pressure"),
+                ("length_offset", "tip_shape"),
+                ("creep", "stress_softening"),
+                ("law_shape", "order_too_low"),
+            )
+        )
         effects = tuple(_wanted(half, rng, i, 0.06, 0.2) for i in pair)
     fields = _suited(effects, rng) | fields
     return _base(half, rng, "inseparable", design, index, effects=effects, **fields)
@@ -170,8 +242,17 @@ def _outside(half: Half, rng: random.Random, index: int) -> Recipe:
         effects = (_wanted(half, rng, rng.choice(HISTORY_AND_RIG + STATIC), 4.0, 8.0),)
     low, high = (2.5, 5.0) if kind == "quantisation" else (1.5, 5.0)
     loops = _loops_fields(rng) if rng.random() < 0.3 and not effects else {}
-    return _base(half, rng, "outside", kind, index, effects=effects, outside=kind,
-                 outside_multiple=round(rng.uniform(low, high), 3), **(_suited(effects, rng) | loops))
+    return _base(
+        half,
+        rng,
+        "outside",
+        kind,
+        index,
+        effects=effects,
+        outside=kind,
+        outside_multiple=round(rng.uniform(low, high), 3),
+        **(_suited(effects, rng) | loops),
+    )
 
 
 @cache

@@ -25,14 +25,20 @@ from .sets import DEVELOP_HALF, LOCKED_HALF, digest, recipes
 
 LOCKED_SHA256 = "0fcbaa62649a3523ecea102aacfdf5050c7c7f459b8087b63cd62cc5d50b397a"
 
-MPAM1_E = {50.0: (4.6791e7, -1.0822e8, 7.8137e7, -1.66755e7),
-           100.0: (9.2886e7, -2.1444e8, 1.5480e8, -3.3207e7),
-           150.0: (1.4356e8, -3.3089e8, 2.3844e8, -5.1072e7),
-           200.0: (1.7603e8, -4.0556e8, 2.9214e8, -6.2561e7),
-           250.0: (2.1824e8, -5.0125e8, 3.5947e8, -7.6423e7)}
-MPAM1_N = {50.0: (16.02, 12.14, 8.35, 1.64), 100.0: (34.98, 27.60, 20.66, 8.79),
-           150.0: (54.80, 44.12, 33.87, 16.33), 200.0: (73.25, 57.48, 44.05, 21.91),
-           250.0: (94.32, 74.49, 57.90, 30.51)}
+MPAM1_E = {
+    50.0: (4.6791e7, -1.0822e8, 7.8137e7, -1.66755e7),
+    100.0: (9.2886e7, -2.1444e8, 1.5480e8, -3.3207e7),
+    150.0: (1.4356e8, -3.3089e8, 2.3844e8, -5.1072e7),
+    200.0: (1.7603e8, -4.0556e8, 2.9214e8, -6.2561e7),
+    250.0: (2.1824e8, -5.0125e8, 3.5947e8, -7.6423e7),
+}
+MPAM1_N = {
+    50.0: (16.02, 12.14, 8.35, 1.64),
+    100.0: (34.98, 27.60, 20.66, 8.79),
+    150.0: (54.80, 44.12, 33.87, 16.33),
+    200.0: (73.25, 57.48, 44.05, 21.91),
+    250.0: (94.32, 74.49, 57.90, 30.51),
+}
 MPAM1_FREE = {50.0: 0.2264, 100.0: 0.2873, 150.0: 0.3125, 200.0: 0.3230, 250.0: 0.3334}
 
 
@@ -44,18 +50,27 @@ def _published() -> Muscle:
 
 
 def _rubber(friction: str = "coulomb", kinematics: str = "inextensible_braid") -> Muscle:
-    simulation = Simulation(kinematics, "engineering", friction, (0.3 if friction == "strand" else 0.06,),
-                            law=Law("constant", ((4e5,), (1e5,))), declared_E_Pa=(4e5, 1e5))
+    simulation = Simulation(
+        kinematics,
+        "engineering",
+        friction,
+        (0.3 if friction == "strand" else 0.06,),
+        law=Law("constant", ((4e5,), (1e5,))),
+        declared_E_Pa=(4e5, 1e5),
+    )
     return Muscle("rubber", Geometry(80.0, 3.4, 0.6, 69.0), Braid(1.8, 0.33, 0.12, 48), simulation)
 
 
-PROTOCOL = Protocol((90.0, 160.0, 240.0), cycles=2, speeds_mm_s=(1.5, 8.0), rows_max=700, noise_N=0.2,
-                    correlated_N=0.1)
+PROTOCOL = Protocol(
+    (90.0, 160.0, 240.0), cycles=2, speeds_mm_s=(1.5, 8.0), rows_max=700, noise_N=0.2, correlated_N=0.1
+)
 
 
 def _muscle_for(effect: str) -> Muscle:
-    return _rubber("strand" if effect == "coulomb_friction" else "coulomb",
-                   "constant_thickness" if effect == "braid_kinematics" else "inextensible_braid")
+    return _rubber(
+        "strand" if effect == "coulomb_friction" else "coulomb",
+        "constant_thickness" if effect == "braid_kinematics" else "inextensible_braid",
+    )
 
 
 @pytest.mark.parametrize("pressure", list(MPAM1_N))
@@ -180,8 +195,14 @@ def test_outside_structures_have_the_wanted_size(kind: str) -> None:
 
 
 def _example() -> Case:
-    return Case("example", 12, "separable", _rubber(), PROTOCOL,
-                (Hidden("creep", "stretched", 0.02), Hidden("dead_band", "sharp", 8.0)))
+    return Case(
+        "example",
+        12,
+        "separable",
+        _rubber(),
+        PROTOCOL,
+        (Hidden("creep", "stretched", 0.02), Hidden("dead_band", "sharp", 8.0)),
+    )
 
 
 def test_files_parse_back_and_are_the_same_bytes(tmp_path: Path) -> None:

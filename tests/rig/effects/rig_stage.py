@@ -19,6 +19,7 @@ def blocked_top(m: Muscle, rows: Rows) -> float:
 
 # --- dead band: P_DB [kPa] ---------------------------------------------------------------------------------
 
+
 def _sharp(state: State, size: float) -> None:
     """P -> max(P - P_DB, 0)."""
     state.pressure = np.maximum(state.pressure - size, 0.0)
@@ -48,16 +49,23 @@ def _dead_band_unit(m: Muscle, rows: Rows) -> float:
 
 # --- pressure droop: percent at full stroke ----------------------------------------------------------------
 
+
 def _droop(shape: str) -> Callable[[State, float], None]:
     def apply(state: State, size: float) -> None:
         u = state.rows.fraction
-        bent = {"linear": u, "quadratic": u**2, "cosine": 0.5 * (1.0 - np.cos(np.pi * u)),
-                "root": np.sqrt(np.maximum(u, 0.0)) * u}[shape]
+        bent = {
+            "linear": u,
+            "quadratic": u**2,
+            "cosine": 0.5 * (1.0 - np.cos(np.pi * u)),
+            "root": np.sqrt(np.maximum(u, 0.0)) * u,
+        }[shape]
         state.pressure = state.pressure * (1.0 - 0.01 * size * bent)
+
     return apply
 
 
 # --- length offset [mm] ------------------------------------------------------------------------------------
+
 
 def _offset(state: State, size: float) -> None:
     state.shortening = state.shortening + size
@@ -75,6 +83,7 @@ def _offset_scale(state: State, size: float) -> None:
 
 
 # --- fixture that gives: mm per N --------------------------------------------------------------------------
+
 
 def _compliance(state: State, size: float) -> None:
     state.shortening = state.shortening + size * state.force
@@ -116,22 +125,47 @@ def _two_percent(m: Muscle, rows: Rows) -> float:
     return 2.0
 
 
-def _form(effect: str, name: str, parameter: str, apply: Callable[[State, float], None],
-          unit: Callable[[Muscle, Rows], float], **more: Any) -> Form:
+def _form(
+    effect: str,
+    name: str,
+    parameter: str,
+    apply: Callable[[State, float], None],
+    unit: Callable[[Muscle, Rows], float],
+    **more: Any,
+) -> Form:
     return Form(effect, name, parameter, "rig", apply, unit, **more)
 
 
 FORMS: tuple[Form, ...] = (
-    *(_form("dead_band", name, "P_DB_kPa", apply, _dead_band_unit, high=3.0, shared=name == "sharp")
-      for name, apply in (("sharp", _sharp), ("softplus", _softplus), ("closing_gap", _closing_gap))),
-    *(_form("pressure_droop", name, "droop_percent", _droop(name), _two_percent, shared=name == "linear")
-      for name in ("linear", "quadratic", "cosine", "root")),
-    *(_form("length_offset", name, "offset_mm", apply, _length_unit, signed=True, shared=name == "constant")
-      for name, apply in (("constant", _offset), ("settling", _offset_settling), ("scale", _offset_scale))),
-    *(_form("rig_compliance", name, "compliance_mm_per_N", apply, _compliance_unit, feedback=True,
-            shared=name == "linear")
-      for name, apply in (("linear", _compliance), ("hertz", _hertz), ("toe", _toe),
-                          ("progressive", _progressive))),
+    *(
+        _form("dead_band", name, "P_DB_kPa", apply, _dead_band_unit, high=3.0, shared=name == "sharp")
+        for name, apply in (("sharp", _sharp), ("softplus", _softplus), ("closing_gap", _closing_gap))
+    ),
+    *(
+        _form("pressure_droop", name, "droop_percent", _droop(name), _two_percent, shared=name == "linear")
+        for name in ("linear", "quadratic", "cosine", "root")
+    ),
+    *(
+        _form("length_offset", name, "offset_mm", apply, _length_unit, signed=True, shared=name == "constant")
+        for name, apply in (("constant", _offset), ("settling", _offset_settling), ("scale", _offset_scale))
+    ),
+    *(
+        _form(
+            "rig_compliance",
+            name,
+            "compliance_mm_per_N",
+            apply,
+            _compliance_unit,
+            feedback=True,
+            shared=name == "linear",
+        )
+        for name, apply in (
+            ("linear", _compliance),
+            ("hertz", _hertz),
+            ("toe", _toe),
+            ("progressive", _progressive),
+        )
+    ),
 )
 
 __all__ = ["FORMS", "Array", "blocked_top"]

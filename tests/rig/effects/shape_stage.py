@@ -17,6 +17,7 @@ _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 
 # --- end pieces: factor on the length they take ------------------------------------------------------------
 
+
 def _circular_tip(g: Geometry, radius: Array) -> Array:
     """2 (pi/2 - 1)(R - R0): quarter circles (Eq. 2.47)."""
     return 2.0 * (np.pi / 2.0 - 1.0) * (radius - g.R0_mm)
@@ -49,10 +50,12 @@ def _conical_tip(g: Geometry, radius: Array) -> Array:
 def _tip(profile: Callable[[Geometry, Array], Array]) -> Callable[[State, float], None]:
     def apply(state: State, size: float) -> None:
         state.tip = lambda g, radius: size * profile(g, radius)
+
     return apply
 
 
 # --- kinematics: the radius follows the strands ------------------------------------------------------------
+
 
 def _mixed(size: float, other: Shape, base: Shape) -> Shape:
     return Shape(base.L, base.R + size * (other.R - base.R), base.t + size * (other.t - base.t), base.T)
@@ -75,11 +78,14 @@ def _follow(kind: str) -> Callable[[State, float], None]:
     def apply(state: State, size: float) -> None:
         declared = state.muscle.simulation.kinematics
         state.shape = lambda g, length, stretch: _mixed(
-            size, build(state, g, length, stretch), shape_of(g, length, declared, stretch))
+            size, build(state, g, length, stretch), shape_of(g, length, declared, stretch)
+        )
+
     return apply
 
 
 # --- braid angle: true minus declared [deg] ----------------------------------------------------------------
+
 
 def _angle(state: State, size: float) -> None:
     state.angle_drift = state.angle_drift + size
@@ -97,6 +103,7 @@ def _bedding(state: State, size: float) -> None:
 
 
 # --- strands that stretch: factor on their compliance ------------------------------------------------------
+
 
 def strand_energy_force(m: Muscle, g: Geometry, length: Array, pressure: Array) -> Array:
     """L/(E A n) 4 pi^2 P^2 B^3 / (2 pi N)^4 in N (Eq. 2.25)."""
@@ -120,6 +127,7 @@ def _stretching(crimped: bool) -> Callable[[State, float], None]:
     Hoop balance P R L = (n N) tension cos(alpha) gives tension = 2 pi P B L / (n (2 pi N)^2). `crimped`
     strands straighten first: three times as compliant at no load, easing off with the load.
     """
+
     def apply(state: State, size: float) -> None:
         braid = state.muscle.braid
         if braid is None:
@@ -138,7 +146,9 @@ def _stretching(crimped: bool) -> Callable[[State, float], None]:
                 ease = 1.0 + 2.0 * np.exp(-3.0 * tension / full) if crimped else 1.0
                 e = size * tension / section * ease
             return 1.0 + e
+
         state.stretch = stretch
+
     return apply
 
 
@@ -146,20 +156,42 @@ def _constant(value: float) -> Callable[[Muscle, Rows], float]:
     return lambda m, rows: value
 
 
-def _form(effect: str, name: str, parameter: str, apply: Callable[[State, float], None], unit: float,
-          stage: str = "shape", **more: Any) -> Form:
+def _form(
+    effect: str,
+    name: str,
+    parameter: str,
+    apply: Callable[[State, float], None],
+    unit: float,
+    stage: str = "shape",
+    **more: Any,
+) -> Form:
     return Form(effect, name, parameter, stage, apply, _constant(unit), **more)
 
 
 FORMS: tuple[Form, ...] = (
-    *(_form("tip_shape", name, "tip_factor", _tip(profile), 0.5, high=3.0, shared=name == "circular")
-      for name, profile in (("circular", _circular_tip), ("elliptic", _elliptic_tip),
-                            ("cosine", _cosine_tip), ("conical", _conical_tip))),
-    *(_form("braid_kinematics", name, "", _follow(name), 1.0, low=1.0, high=1.0, shared=name == "strands")
-      for name in ("strands", "centreline", "packed")),
-    *(_form("braid_angle", name, "delta_alpha_deg", apply, 0.5, signed=True, shared=name == "uniform")
-      for name, apply in (("uniform", _angle), ("two_families", _two_families), ("bedding", _bedding))),
-    *(_form("braid_stretch", name, "braid_factor", apply, 1.0, shared=name == "energy")
-      for name, apply in (("energy", _energy), ("balance", _stretching(False)),
-                          ("crimped", _stretching(True)))),
+    *(
+        _form("tip_shape", name, "tip_factor", _tip(profile), 0.5, high=3.0, shared=name == "circular")
+        for name, profile in (
+            ("circular", _circular_tip),
+            ("elliptic", _elliptic_tip),
+            ("cosine", _cosine_tip),
+            ("conical", _conical_tip),
+        )
+    ),
+    *(
+        _form("braid_kinematics", name, "", _follow(name), 1.0, low=1.0, high=1.0, shared=name == "strands")
+        for name in ("strands", "centreline", "packed")
+    ),
+    *(
+        _form("braid_angle", name, "delta_alpha_deg", apply, 0.5, signed=True, shared=name == "uniform")
+        for name, apply in (("uniform", _angle), ("two_families", _two_families), ("bedding", _bedding))
+    ),
+    *(
+        _form("braid_stretch", name, "braid_factor", apply, 1.0, shared=name == "energy")
+        for name, apply in (
+            ("energy", _energy),
+            ("balance", _stretching(False)),
+            ("crimped", _stretching(True)),
+        )
+    ),
 )

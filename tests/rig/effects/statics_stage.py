@@ -20,10 +20,12 @@ def _uniform(state: State, size: float) -> None:
 
 def _lame(state: State, size: float) -> None:
     """Twice the mean pressure through an elastic thick wall (Lame) as a share of P; 1 for a thin one."""
+
     def factor(s: Shape, p: Array) -> Array:
         inner, outer = (s.R - s.t) ** 2, s.R**2
         mean = inner / (outer - inner) * (outer * np.log(outer / inner) / (outer - inner) - 1.0)
         return 1.0 - size * 2.0 * mean
+
     state.thickness.append(factor)
 
 
@@ -41,6 +43,7 @@ def _thinning(state: State, size: float) -> None:
 
 # --- law shape: E_k(P) times 1 + size x bend ---------------------------------------------------------------
 
+
 def _bends(kind: str) -> Callable[[State, float], None]:
     def apply(state: State, size: float) -> None:
         levels = state.rows.setpoint
@@ -49,13 +52,17 @@ def _bends(kind: str) -> Callable[[State, float], None]:
 
         def bend(p: Array) -> Array:
             v = (p - middle) / half
-            shape = {"quadratic": v**2 - 0.5,
-                     "saturating": 1.5 - 2.0 * np.exp(-3.0 * np.maximum(p, 0.0) / top) - 0.5,
-                     "power": np.sqrt(np.maximum(p, 0.0) / top) - 0.5,
-                     "knee": np.maximum(v + 0.2, 0.0),
-                     "sigmoid": np.tanh(2.5 * v)}[kind]
+            shape = {
+                "quadratic": v**2 - 0.5,
+                "saturating": 1.5 - 2.0 * np.exp(-3.0 * np.maximum(p, 0.0) / top) - 0.5,
+                "power": np.sqrt(np.maximum(p, 0.0) / top) - 0.5,
+                "knee": np.maximum(v + 0.2, 0.0),
+                "sigmoid": np.tanh(2.5 * v),
+            }[kind]
             return np.maximum(1.0 + size * shape, 0.02)
+
         state.bends.append(bend)
+
     return apply
 
 
@@ -64,6 +71,7 @@ def _quarter(m: Muscle, rows: Rows) -> float:
 
 
 # --- order too low: stress added to the wall ---------------------------------------------------------------
+
 
 def _hoop_reference(state: State) -> tuple[float, float]:
     """Largest hoop strain over the stroke and the wall's polynomial stress [N/mm2] there."""
@@ -78,6 +86,7 @@ def _hoop_reference(state: State) -> tuple[float, float]:
 
 def _extra(kind: str) -> Callable[[State, float], None]:
     """Extra stress that is `size` times the polynomial's at the largest hoop strain e1."""
+
     def apply(state: State, size: float) -> None:
         e1, stress = _hoop_reference(state)
         order = state.muscle.simulation.law.order
@@ -92,7 +101,9 @@ def _extra(kind: str) -> Callable[[State, float], None]:
             if kind == "exponential":  # Fung-like, with its first terms left to the polynomial
                 return scale * (np.exp(3.0 * u) - 1.0 - 3.0 * u - 4.5 * u**2) / (np.exp(3.0) - 8.5)
             return scale * 0.36 * u**3 / np.maximum(1.0 - 0.64 * u**2, 0.05)  # Gent-like limit of the chains
+
         state.stresses.append(added)
+
     return apply
 
 
@@ -100,17 +111,35 @@ def _half(m: Muscle, rows: Rows) -> float:
     return 0.5
 
 
-def _form(effect: str, name: str, parameter: str, apply: Callable[[State, float], None],
-          unit: Callable[[Muscle, Rows], float], **more: Any) -> Form:
+def _form(
+    effect: str,
+    name: str,
+    parameter: str,
+    apply: Callable[[State, float], None],
+    unit: Callable[[Muscle, Rows], float],
+    **more: Any,
+) -> Form:
     return Form(effect, name, parameter, "statics", apply, unit, **more)
 
 
 FORMS: tuple[Form, ...] = (
-    *(_form("wall_pressure", name, "wall_factor", apply, _half, high=2.4, shared=name == "uniform")
-      for name, apply in (("uniform", _uniform), ("lame", _lame), ("seating", _seating),
-                          ("thinning", _thinning))),
-    *(_form("law_shape", name, "", _bends(name), _quarter, high=3.5, signed=True, shared=name == "quadratic")
-      for name in ("quadratic", "saturating", "power", "knee", "sigmoid")),
-    *(_form("order_too_low", name, "", _extra(name), _half, high=4.0, shared=name == "next")
-      for name in ("next", "second_next", "exponential", "gent")),
+    *(
+        _form("wall_pressure", name, "wall_factor", apply, _half, high=2.4, shared=name == "uniform")
+        for name, apply in (
+            ("uniform", _uniform),
+            ("lame", _lame),
+            ("seating", _seating),
+            ("thinning", _thinning),
+        )
+    ),
+    *(
+        _form(
+            "law_shape", name, "", _bends(name), _quarter, high=3.5, signed=True, shared=name == "quadratic"
+        )
+        for name in ("quadratic", "saturating", "power", "knee", "sigmoid")
+    ),
+    *(
+        _form("order_too_low", name, "", _extra(name), _half, high=4.0, shared=name == "next")
+        for name in ("next", "second_next", "exponential", "gent")
+    ),
 )

@@ -1,0 +1,64 @@
+"""diagnose from a folder to a folder: what it writes, that it repeats, and that its repair is accepted."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from rig import case as rig_case
+from rig import recipes, sets
+
+from mpam_calib.run.diagnose import diagnose_to_folder
+from mpam_calib.specimen import read
+
+CASE = "develop-separable-016"
+"""Coulomb friction and a dead-band of another form, hidden in a muscle with tensile moduli."""
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, frozenset[str]]:
+    folder = tmp_path_factory.mktemp("diagnose")
+    one = recipes.build_case(next(r for r in sets.recipes("develop") if r.name == CASE))
+    rig_case.write_case(one, folder / "specimen", folder / "truth.json")
+    diagnose_to_folder(folder / "specimen", folder / "run")
+    return folder / "run", frozenset(one.ids)
+
+
+def test_the_hidden_causes_are_named(runs: tuple[Path, frozenset[str]]) -> None:
+    content = json.loads((runs[0] / "diagnosis.json").read_text())
+    assert content["verdict"] == "named"
+    assert {cause["id"] for cause in content["causes"]} == runs[1]
+    assert all(cause["probability"] >= 0.95 for cause in content["causes"])
+    assert sum(cause["share_of_misfit"] for cause in content["causes"]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_gain_is_measured_on_levels_left_out(runs: tuple[Path, frozenset[str]]) -> None:
+    gain = json.loads((runs[0] / "diagnosis.json").read_text())["gain"]
+    assert gain["rmse_after_N"] < 0.5 * gain["rmse_before_N"]
+    assert gain["elpd_gain"] > 3.0 * gain["elpd_gain_se"]
+    assert gain["coverage90_after"] >= 0.8
+    assert gain["folds_same_set"] >= gain["folds"] - 1
+
+
+def test_nothing_hidden_is_adequate_and_the_bytes_repeat(tmp_path: Path) -> None:
+    one = recipes.build_case(next(r for r in sets.recipes("develop") if r.group == "null"))
+    rig_case.write_case(one, tmp_path / "specimen", tmp_path / "truth.json")
+    for name in ("first", "second"):
+        diagnose_to_folder(tmp_path / "specimen", tmp_path / name)
+    first, second = ((tmp_path / name / "diagnosis.json").read_bytes() for name in ("first", "second"))
+    assert first == second
+    content = json.loads(first)
+    assert (content["verdict"], content["causes"], content["gain"]) == ("adequate", [], None)
+
+
+def test_the_extended_specimen_is_accepted(runs: tuple[Path, frozenset[str]]) -> None:
+    extended = read(runs[0] / "extended")
+    assert set(extended.simulation.effect_ids) == runs[1]
+    assert extended.loops is not None
+
+
+def test_the_report_names_the_causes(runs: tuple[Path, frozenset[str]]) -> None:
+    page = (runs[0] / "report.html").read_text()
+    assert "Coulomb friction" in page and "dead-band" in page.lower()
+    assert "http://" not in page.replace("http://www.w3.org", "")

@@ -1,0 +1,108 @@
+"""One hypothesis: its evidence is exact where it must be, its forms are silent at size zero."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rig import case as rig_case
+from rig import recipes, sets
+from scipy import stats
+
+from mpam_calib.criticism.candidates import candidates
+from mpam_calib.criticism.fit import fit
+from mpam_calib.criticism.problem import SIZES, Problem, build_problem
+from mpam_calib.model.blueprint import Options, draw_blueprint
+from mpam_calib.model.chain import Chain
+from mpam_calib.model.effect import effect, known_effects
+from mpam_calib.specimen import Specimen, read
+
+
+def specimen_of(name: str) -> Specimen:
+    recipe = next(r for r in sets.recipes("develop") if r.name == name)
+    one = recipes.build_case(recipe)
+    folder = Path(tempfile.mkdtemp())
+    rig_case.write_case(one, folder / "specimen", folder / "truth.json")
+    return read(folder / "specimen")
+
+
+def problem_of(specimen: Specimen) -> Problem:
+    return build_problem(specimen, draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
+
+
+@pytest.fixture(scope="module")
+def null_problem() -> Problem:
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
+    return problem_of(specimen_of(recipe.name))
+
+
+@pytest.mark.parametrize("size", range(len(SIZES)))
+def test_evidence_of_a_linear_hypothesis_is_exact(null_problem: Problem, size: int) -> None:
+    """Without friction the force is linear in the moduli's one factor: a Gaussian marginal in closed form."""
+    simulation = null_problem.blueprint.simulation.model_copy(update={"friction": "none"})
+    blueprint = null_problem.blueprint.model_copy(update={"simulation": simulation})
+    found = fit(null_problem, frozenset(), size, None, blueprint)
+    setting = blueprint.setting()
+    assert setting is not None
+    from mpam_calib.model.model import build_model
+
+    chain = build_model(blueprint).chain
+    assert chain is not None
+    terms = chain.terms({"": np.zeros((1, 1))}, null_problem.readings)
+    n = len(null_problem)
+    fixed = 0.5 * (terms.fixed[0, :n] + terms.fixed[0, n:])
+    columns = 0.5 * (terms.columns[0, :n] + terms.columns[0, n:])
+    covariance = null_problem.covariance(SIZES[size]) + columns @ columns.T
+    exact = stats.multivariate_normal.logpdf(null_problem.force, fixed, covariance, allow_singular=False)
+    assert found.log_evidence == pytest.approx(exact, abs=1e-5)
+
+
+def test_forms_are_silent_at_size_zero(null_problem: Problem) -> None:
+    setting = null_problem.model.setting
+    assert setting is not None
+    base = null_problem.model.chain
+    assert base is not None
+    values = {p.name: p.prior.from_normal(np.zeros((1, 1))) for p in base.parameters}
+    eta = np.zeros((1, base.linear_size))
+    expected = base.force(values, eta, null_problem.readings)
+    seen = 0
+    for identifier in known_effects():
+        item = effect(identifier)
+        if identifier in ("braid_kinematics", "coulomb_friction") or (
+            item.needs_braid and null_problem.blueprint.braid is None
+        ):
+            continue
+        for form in (identifier, *(f"{identifier}:{name}" for name in item.forms)):
+            simulation = null_problem.blueprint.simulation.model_copy(update={"effects": (form,)})
+            blueprint = null_problem.blueprint.model_copy(update={"simulation": simulation})
+            changed = blueprint.setting()
+            assert changed is not None
+            zero = {p.name: np.full((1, 1), 1e-12) for p in effect(form).parameters(changed)}
+            force = Chain(changed, base.moduli, False).force(values | zero, eta, null_problem.readings)
+            np.testing.assert_allclose(force, expected, atol=1e-6, err_msg=form)
+            seen += 1
+    assert seen >= 25
+
+
+def test_what_cannot_be_tested_is_said(null_problem: Problem) -> None:
+    slow = null_problem.take(null_problem.cycle == 1)
+    left = dict(candidates(slow).not_tested)
+    assert left["stress_softening"] == "one cycle"
+    everything = candidates(null_problem)
+    assert not set(everything.tested) & set(dict(everything.not_tested))
+    assert f"{null_problem.blueprint.simulation.friction}_friction" not in everything.tested
+
+
+def test_noise_is_found_before_any_model(null_problem: Problem) -> None:
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
+    one = recipes.build_case(recipe)
+    truth = one.protocol
+    total = (
+        float(np.hypot(truth.noise_white, truth.noise_correlated)) if hasattr(truth, "noise_white") else None
+    )
+    declared = specimen_of(recipe.name).sensors.force_sd_N
+    wanted = total if total is not None else declared
+    assert wanted is not None
+    assert null_problem.noise_level.total == pytest.approx(wanted, rel=0.3)
