@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mpam_calib.design.draws import MuscleDraws, mean_force, quantile_force
 from mpam_calib.design.optimality import optimality
 from mpam_calib.design.problem import Function, Problem, case_one, case_two
-from mpam_calib.design.search import hybrid, refine
+from mpam_calib.design.search import hybrid, refine, to_bounds
 from mpam_calib.model.model import Model
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.prediction.curves import LIMIT
@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 SEARCHED, BANDED = 400, 2000
 """Draws behind the searches, and behind what is reported."""
 GENERATIONS = 20
+REFINED = 15
+"""Iterations of SQP over all draws, where every step costs."""
 METHODS = ("posterior_mean", "q05")
 COLUMNS = [
     "case",
@@ -104,23 +106,39 @@ class Optimiser:
     def at(self, P: float) -> list[Design]:
         """Both cases by both methods at P (Pa).
 
-        Each search over few draws ends in a design, which a gradient search over all draws refines. Of
-        all designs of a case a method is given the best by its own aim: none is beaten at it by the other.
+        Each search over few draws ends in a design; over all draws a short gradient search refines it
+        and it is moved to the bounds that gain. Of all designs of a case a method is given the best by
+        its own aim: none is beaten at it by the other.
         """
+        two, walls = self._case(P, case_two, [])
+        one, _ = self._case(P, case_one, walls)
+        return [*one, *two]
+
+    def _case(
+        self, P: float, case: Callable[..., Problem], walls: list[Array]
+    ) -> tuple[list[Design], list[Array]]:
+        """The designs of one case, and all finalists; ``walls`` (R, t, α) are tried with its strands."""
+        many = {m: case(P, objective=self.objective(m, P, self.many)) for m in METHODS}
+        finalists = [self._search(case(P, objective=self.objective(m, P))) for m in METHODS]
+        finalists += [np.append(wall, x[3:]) for wall in walls for x in list(finalists)]
+        for method in METHODS:
+            start = finalists[self._best(P, many[method], method, finalists)[0]]
+            start = to_bounds(many[method], start)
+            refined = refine(many[method], start, "SQP", REFINED).x
+            finalists += [start, to_bounds(many[method], refined)]
         found = []
-        for case in (case_one, case_two):
-            few = {m: case(P, objective=self.objective(m, P)) for m in METHODS}
-            all_draws = {m: case(P, objective=self.objective(m, P, self.many)) for m in METHODS}
-            finalists = [self._search(problem) for problem in few.values()]
-            pairs = zip(all_draws.values(), list(finalists), strict=True)
-            finalists += [refine(problem, start, "SQP").x for problem, start in pairs]
-            forces = self.many.blocked_forces(P, np.stack(finalists))
-            scores = {"posterior_mean": forces.mean(axis=-1), "q05": np.quantile(forces, 0.05, axis=-1)}
-            for method, problem in all_draws.items():
-                allowed = [problem.feasible(x, 1e-6) for x in finalists]
-                i = int(np.argmax(np.where(allowed, scores[method], -np.inf)))
-                found.append(self._design(problem, P, method, finalists[i], forces[i]))
-        return found
+        for method, problem in many.items():
+            i, force = self._best(P, problem, method, finalists)
+            found.append(self._design(problem, P, method, finalists[i], force))
+        return found, finalists
+
+    def _best(self, P: float, problem: Problem, method: str, designs: list[Array]) -> tuple[int, Array]:
+        """Which of the designs a method likes best over all draws, and its force by draw (N,)."""
+        forces = self.many.blocked_forces(P, np.stack(designs))
+        aim = forces.mean(axis=-1) if method == METHODS[0] else np.quantile(forces, 0.05, axis=-1)
+        allowed = [problem.feasible(x, 1e-6) for x in designs]
+        i = int(np.argmax(np.where(allowed, aim, -np.inf)))
+        return i, forces[i]
 
     def packed(self, P: float, radii: Sequence[float]) -> Packed:
         """Case I by the posterior mean with the packing constraint, for upper bounds of R_br (m)."""

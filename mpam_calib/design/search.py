@@ -30,6 +30,8 @@ _minimize: Any = optimize.minimize
 
 POPULATION, GENERATIONS = 12, 60
 """Individuals for each variable, and generations at most."""
+ITERATIONS = (200, 500)
+"""Iterations of SQP and of interior point at most."""
 BARRIER = 1e-10
 """Interior point ends when its logarithmic barrier weighs less than this (objective scaled to 1)."""
 
@@ -124,9 +126,12 @@ def evolve(problem: Problem, seed: int, generations: int = GENERATIONS) -> Stage
     return Stage("GA", x, float(problem.objective(x)), int(result.nit), objective.count, tuple(history))
 
 
-def refine(problem: Problem, start: Array, method: Local) -> Stage:
-    """Local search from ``start`` (SI), integers relaxed, then fixed to their neighbours in turn."""
-    relaxed = _local(problem, start, method, {})
+def refine(problem: Problem, start: Array, method: Local, iterations: int = ITERATIONS[0]) -> Stage:
+    """Local search from ``start`` (SI), integers relaxed, then fixed to their neighbours in turn.
+
+    ``iterations`` bounds each run of SQP.
+    """
+    relaxed = _local(problem, start, method, {}, iterations)
     if not problem.integers:
         return relaxed
     choices = [
@@ -134,7 +139,8 @@ def refine(problem: Problem, start: Array, method: Local) -> Stage:
     ]
     evaluations, best = relaxed.evaluations, None
     for values in itertools.product(*choices):
-        stage = _local(problem, relaxed.x, method, dict(zip(problem.integers, values, strict=True)))
+        fixed = dict(zip(problem.integers, values, strict=True))
+        stage = _local(problem, relaxed.x, method, fixed, iterations)
         evaluations += stage.evaluations
         if best is None or stage.value > best.value:
             best = stage
@@ -147,7 +153,7 @@ def refine(problem: Problem, start: Array, method: Local) -> Stage:
     )
 
 
-def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float]) -> Stage:
+def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float], iterations: int) -> Stage:
     """One run of SQP or interior point in the unit box over the variables that are not fixed."""
     objective = _Counted(problem)
     base = problem.scaled(start)
@@ -189,7 +195,7 @@ def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float
             method="SLSQP",
             bounds=Bounds(0.0, 1.0),
             constraints=[{"type": "ineq", "fun": g, "jac": slope} for g, slope in constraints],
-            options={"ftol": 1e-13, "maxiter": 200},
+            options={"ftol": 1e-13, "maxiter": iterations},
             callback=sqp_step,
         )
     else:
@@ -208,7 +214,7 @@ def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float
                 "gtol": 1e-300,
                 "xtol": 1e-300,
                 "barrier_tol": BARRIER / 10.0,
-                "maxiter": 500,
+                "maxiter": ITERATIONS[1],
                 "initial_tr_radius": 0.05,
                 "initial_barrier_parameter": 1e-3,
                 "initial_barrier_tolerance": 1e-3,
@@ -230,3 +236,19 @@ def hybrid(
     """Evolutionary search, then each local method from its result (thesis 3.3)."""
     start = evolve(problem, seed, generations)
     return Optimum(problem, start, tuple(refine(problem, start.x, method) for method in local))
+
+
+def to_bounds(problem: Problem, x: Array) -> Array:
+    """The design (SI) moved to a bound in one variable at a time, as long as that gains and is allowed.
+
+    What a gradient search leaves undone where one variable hardly counts, or the objective has kinks.
+    """
+    best, value = np.array(x), float(problem.objective(x))
+    while True:
+        moves = np.concatenate([best + np.diag(b - best) for b in (problem.lower, problem.upper)])
+        allowed = [problem.feasible(move) for move in moves]
+        values = np.where(allowed, problem.objective(moves), -np.inf)
+        i = int(np.argmax(values))
+        if values[i] <= value:
+            return best
+        best, value = moves[i], float(values[i])

@@ -8,7 +8,7 @@ import pytest
 from mpam_calib.design import blocked
 from mpam_calib.design.optimality import optimality
 from mpam_calib.design.problem import RATIO_LOW, case_one, case_two
-from mpam_calib.design.search import hybrid, refine
+from mpam_calib.design.search import hybrid, refine, to_bounds
 from mpam_calib.design.sensitivity import around, of_ratio_bound
 from mpam_calib.physics.kinematics import Rest
 from mpam_calib.physics.statics import braid_energy_force
@@ -73,6 +73,15 @@ def test_integer_is_kept_where_the_best_is_between_two() -> None:
     shifted = case_one(P, objective=towards)
     start = np.array([2.5 * MM, 0.8 * MM, 70 * DEG, 1 * MM, 40.0])
     assert refine(shifted, start, "SQP").x[4] == 57.0
+
+
+def test_to_bounds_moves_what_gains_and_is_allowed() -> None:
+    # n and R_br go to their upper bounds; the wall's lower bound would break the constraint.
+    x = to_bounds(case_one(P), np.array([R, 0.8 * MM, ALPHA, 2.4 * MM, 75.0]))
+    assert x == pytest.approx([R, 0.8 * MM, ALPHA, 2.5 * MM, 100.0])
+    packed = case_one(P, packing=True)
+    start = np.array([R, 0.8 * MM, ALPHA, 0.1 * MM, 75.0])
+    assert packed.feasible(to_bounds(packed, start)) and to_bounds(packed, start)[4] == 100.0
 
 
 def test_multipliers_are_the_derivatives_of_the_optimum() -> None:

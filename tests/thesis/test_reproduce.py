@@ -4,17 +4,31 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import arviz as az
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.axes import Axes
 from typer.testing import CliRunner
 
 from mpam_calib.cli.app import app
 from mpam_calib.errors import InputError
 from mpam_calib.thesis import decoded
 from mpam_calib.thesis.errata import errata
+from mpam_calib.thesis.figures import muscles
+from mpam_calib.thesis.friction import best_strand_factor
 from mpam_calib.thesis.ledger import COLUMNS, MISPRINT, NOT_REPRODUCIBLE, REPRODUCED, Ledger
-from mpam_calib.thesis.posterior import MuscleBands, parameters, strand_factor, table_4_12
+from mpam_calib.thesis.posterior import (
+    MPAM1,
+    MPAM1_STRAND,
+    MPAM2,
+    MuscleBands,
+    missing,
+    parameters,
+    strand_factor,
+    strand_factors,
+    table_4_12,
+)
 from mpam_calib.thesis.reproduction import reproduce
 
 DATASETS = Path(__file__).parents[2] / "datasets"
@@ -180,6 +194,72 @@ def test_bands_join_tables(tmp_path: Path) -> None:
 def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="expected the RUN folder of a finished calibrate"):
         MuscleBands.read("MPAM1", tmp_path)
+
+
+def test_a_run_without_strand_friction_is_refused_where_it_is_wanted(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="found no f_s"):
+        MuscleBands.read(MPAM1_STRAND, run_folder(tmp_path))
+
+
+def strand_run(folder: Path, P_kPa: float = 99.6) -> Path:
+    """A RUN folder with strand friction: one curve, draws of f_s."""
+    folder.mkdir()
+    rng = np.random.default_rng(2)
+    draws = rng.normal(0.3, 0.02, (2, 200))
+    az.from_dict(posterior={"f_s": draws}).to_netcdf(str(folder / "posterior.nc"), engine="h5netcdf")
+    head = "quantity,pressure_kPa,contraction,branch,mean,q05,q25,q50,q75,q95,extrapolated"
+    lines = [
+        f"force_N,{P_kPa},{g},{branch},{30 + 9 * s},{28 + 9 * s},29,30,31,{32 + 9 * s},False"
+        for branch, s in (("loading", 1), ("mean", 0), ("unloading", -1))
+        for g in (0.005, 0.0)
+    ]
+    (folder / "bands.csv").write_text("\n".join([head, *lines]) + "\n")
+    head = "parameter,unit,mean,sd,q05,q50,q95,prior_sd,rhat,ess_bulk,ess_tail"
+    (folder / "summary.csv").write_text(f"{head}\nf_s,,0.3,0.02,0.27,0.3,0.33,0.3,1.0,400,400\n")
+    return folder
+
+
+def test_curve_of_the_nearest_level(tmp_path: Path) -> None:
+    own = MuscleBands.read(MPAM2, strand_run(tmp_path / "run"))
+    assert not own.coulomb
+    curve = own.curve(100.0, "loading")
+    assert list(curve["contraction"]) == [0.0, 0.005] and list(curve["q05"]) == [37, 37]
+    assert own.curve(150.0, "loading").empty
+
+
+def test_bands_reach_the_figures_of_the_loops(tmp_path: Path) -> None:
+    bands = {name: MuscleBands.read(name, strand_run(tmp_path / name)) for name in (MPAM2, MPAM1_STRAND)}
+    # Fig. 4.14 (MPAM1) has no run, Fig. 4.18 has; of the loops only the two with strand friction.
+    assert [len(ax.collections) for ax in muscles.average_curves({}).axes] == [0, 0]
+    assert [filled(ax) for ax in muscles.average_curves(bands).axes] == [0, 1]
+    assert [filled(ax) for ax in muscles.loops(bands).axes] == [2, 0, 2]
+    # A run with the other friction is not put under Fig. 4.22.
+    other = {MPAM1: MuscleBands.read(MPAM1, strand_run(tmp_path / "other"))}
+    assert [filled(ax) for ax in muscles.loops(other).axes] == [0, 0, 0]
+
+
+def filled(ax: Axes) -> int:
+    """How many bands with an extent a panel shows."""
+    return sum(len(path.vertices) > 4 for item in ax.collections for path in item.get_paths())
+
+
+def test_f_s_by_posterior_beside_least_squares(tmp_path: Path) -> None:
+    bands = {name: MuscleBands.read(name, strand_run(tmp_path / name)) for name in (MPAM2, MPAM1_STRAND)}
+    table = strand_factors(bands).set_index("run")
+    assert table["posterior mean"].to_numpy() == pytest.approx(0.3, abs=0.01)
+    assert table.loc[MPAM1_STRAND, "least squares"] == pytest.approx(best_strand_factor(3, 0.98, False))
+    assert np.isnan(table.loc[MPAM2, "least squares"])
+    # Three runs, three commands; what was given is not asked for.
+    assert list(missing({})["run"]) == [MPAM1, MPAM2, MPAM1_STRAND]
+    assert list(missing(bands)["run"]) == [MPAM1]
+    assert table_4_12({MPAM1_STRAND: bands[MPAM1_STRAND]}).empty
+
+
+def test_page_says_what_is_missing_and_how_to_add_it(out: Path) -> None:
+    text = (out / "report.html").read_text(encoding="utf-8")
+    assert "Posteriors: none given" in text
+    for option in ("--mpam1 RUN1", "--mpam2 RUN2", "--mpam1-strand RUN3"):
+        assert option in text
 
 
 def test_draws_of_f_s_beside_the_print() -> None:
