@@ -208,9 +208,9 @@ def _scatter(
         return None
     usable &= rows >= size
     chunks = loops.force_N[starts[usable][:, None] + np.arange(size)]
-    degree = 2 if size >= 6 else 1
-    basis = np.vander(np.linspace(-1.0, 1.0, size), degree + 1)
+    # A parabola, however short the chunk: a slope alone would leave the force's own bend in the noise.
+    basis = np.vander(np.linspace(-1.0, 1.0, size), 3)
     full, _ = np.linalg.qr(basis, mode="complete")
-    contrast = full[:, degree + 1 :]
+    contrast = full[:, 3:]
     projected = chunks @ contrast
     return projected.T @ projected, int(usable.sum()), contrast, typical

@@ -313,9 +313,8 @@ class Twin:
         size = int(min(32, np.quantile([len(b) for b in regular], 0.1)))
         if size < 4:
             return 0.0
-        degree = 2 if size >= 6 else 1
         u = np.linspace(-1.0, 1.0, size)
-        Q = null_space(np.stack([u**d for d in range(degree + 1)]))
+        Q = null_space(np.stack([u**d for d in range(3)]))
         times = loops.time_s[regular[0][:size]]
         C = slow * np.exp(-np.abs(np.subtract.outer(times, times)) / tau) + white * np.eye(size)
         S = Q.T @ C @ Q
