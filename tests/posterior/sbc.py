@@ -72,7 +72,7 @@ def replicate(
     made, blueprint = design(declared, options, **shape)
     u, eta, made = simulate(made, blueprint, rng)
     target, modes = locate(build_target(made, blueprint), np.random.default_rng([seed, 0]))
-    chain = sample(target, modes, seed, max_steps=40).chain
+    chain = sample(target, modes, seed, max_steps=800).chain
     flat = chain.reshape(-1, chain.shape[-1])
     drawn_u = flat[rng.permutation(len(flat))[: 10 * L]]
     values = target.model.values(drawn_u)
