@@ -6,7 +6,6 @@ ECDF must stay inside a band that holds simultaneously along the ECDF and over a
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -65,9 +64,9 @@ def quantities(model, u: Array, eta: Array) -> tuple[list[str], Array]:
 
 
 def replicate(
-    declared: dict, options: Options, seed: int, distort: list[Callable[[Array], Array]], **shape: float
+    declared: dict, options: Options, seed: int, factors: tuple[float, ...], **shape: float
 ) -> tuple[list[str], Array]:
-    """Ranks (distortions, quantities) of one truth among draws that went through each distortion."""
+    """Ranks (factors, quantities) of one truth among draws that were narrowed by each factor."""
     rng = np.random.default_rng([seed, 99])
     made, blueprint = design(declared, options, **shape)
     u, eta, made = simulate(made, blueprint, rng)
@@ -88,16 +87,20 @@ def replicate(
     joint = np.concatenate([drawn_u, drawn_eta], axis=1)
     true_joint = np.concatenate([u, eta], axis=1)
     ranks = []
-    for bend in distort:
+    for factor in factors:
         centre, spread = joint[L:].mean(axis=0), np.cov(joint[L:].T)
         precision = np.linalg.inv(spread)
-        bent = centre + bend(joint[:L] - centre)
-        distance = [np.einsum("ni,ij,nj->n", x - centre, precision, x - centre) for x in (bent, true_joint)]
-        middle = draws.mean(axis=0)
-        narrowed = middle + bend(draws[:L] - middle)
-        below = (narrowed < truth).sum(axis=0)
+        near, distance = narrowed(joint[:L], centre, factor), []
+        for x in (near, true_joint):
+            distance.append(np.einsum("ni,ij,nj->n", x - centre, precision, x - centre))
+        below = (narrowed(draws[:L], np.median(draws, axis=0), factor) < truth).sum(axis=0)
         ranks.append([*below, int((distance[0] < distance[1]).sum())])
     return [*names, "joint distance"], np.array(ranks)
+
+
+def narrowed(draws: Array, centre: Array, factor: float) -> Array:
+    """Draws towards a centre; as they are for a factor of one (w spans decades, where digits would go)."""
+    return draws if factor == 1.0 else centre + factor * (draws - centre)
 
 
 @lru_cache
@@ -137,7 +140,7 @@ def run(declared: dict, options: Options, replicates: int, **shape: float) -> tu
     kept, narrow = [], []
     names: list[str] = []
     for seed in range(replicates):
-        names, ranks = replicate(declared, options, seed, [lambda x: x, lambda x: 0.8 * x], **shape)
+        names, ranks = replicate(declared, options, seed, (1.0, 0.8), **shape)
         kept.append(ranks[0])
         narrow.append(ranks[1])
     return names, np.array(kept), np.array(narrow)
