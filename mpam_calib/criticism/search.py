@@ -23,8 +23,8 @@ from mpam_calib.model.effect import effect
 Array = NDArray[np.float64]
 Set = frozenset[str]
 
-RATE = 0.1
-"""Prior odds of one more cause."""
+RATE = 0.03
+"""Prior odds of one more cause: a passenger must not come close to the set that it rides on."""
 WIDTH = 6
 """Sets of each size that are extended further."""
 PARTNERS = 8

@@ -51,9 +51,9 @@ class Chain:
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
-        """The declared effects in the order of the chain."""
+        """The declared effects in the order of the chain, whatever order they were declared in."""
         return tuple(
-            sorted((effect_by_id(i) for i in self.setting.simulation.effects), key=lambda e: e.stage)
+            sorted((effect_by_id(i) for i in self.setting.simulation.effects), key=lambda e: (e.stage, e.id))
         )
 
     @cached_property

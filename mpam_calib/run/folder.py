@@ -24,7 +24,7 @@ from mpam_calib.run.files import write_csv, write_json
 REPORT = "report.html"
 WRITTEN = ("run.json", "posterior.nc", "summary.csv", "bands.csv", REPORT)
 """What a finished calibration leaves."""
-DERIVED = ("predictions.csv", "designs.csv")
+DERIVED = ("predictions.csv", "designs.csv", "designs.html")
 """What later commands add, and what goes when the posterior they came from goes."""
 PACKAGES = ("mpam-calib", "arviz", "emcee", "numpy", "scipy", "pandas")
 

@@ -26,6 +26,8 @@ from mpam_calib.specimen import read
 
 FIELDS = ["name", "group", "truth", "outside", "word", "named", "listed", "probability"]
 LISTED = 5
+NATS = 10.0
+"""Nats by which the oracle must prefer the truth for a case to count as separable."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,8 @@ def wilson(hits: int, of: int) -> tuple[float, float]:
 
 def rates(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
     """The issue's rates as (what, hits, of)."""
-    separable = {m.name for m in margins.read_margins(which) if m.separable}
+    table = margins.read_margins(which)
+    separable = {name for name, row in table.items() if row["margin"] and float(row["margin"]) >= NATS}
     clean = [s for s in scored if not s.outside]
     sep = [s for s in clean if s.truth and s.name in separable]
     other = [s for s in clean if s.truth and s.name not in separable]
