@@ -6,8 +6,9 @@ The rates to quote come from the whole sets (``make score``).
 from __future__ import annotations
 
 import pytest
-from criticism.score import Scored, score_case
 from rig import sets
+
+from criticism.score import Scored, score_case
 
 STRIDES = {"null": 12, "separable": 6, "outside": 7}
 
