@@ -72,7 +72,8 @@ def outcome(run: Path, ended: Ended) -> str:
     if ended.code not in (DONE, NOT_CONVERGED):
         return f"[red]crashed (exit code {ended.code})[/red]"
     words = "" if ended.code == DONE else "[red]Not converged within its budget.[/red] "
-    found = VERDICT.search((run / "report.html").read_text(encoding="utf-8"))
+    page = _or_nothing(lambda: (run / "report.html").read_text(encoding="utf-8"))
+    found = VERDICT.search(page)
     if found is None:
         return words or "[green]converged[/green]"
     sentence = html.unescape(re.sub(r"<[^>]*>", "", found.group(2))).strip()

@@ -32,6 +32,8 @@ POPULATION, GENERATIONS = 12, 60
 """Individuals for each variable, and generations at most."""
 ITERATIONS = (200, 500)
 """Iterations of SQP and of interior point at most."""
+RESTORATIONS = 3
+"""Newton steps back onto a constraint that SQP overstepped by rounding."""
 BARRIER = 1e-10
 """Interior point ends when its logarithmic barrier weighs less than this (objective scaled to 1)."""
 
@@ -198,6 +200,12 @@ def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float
             options={"ftol": 1e-13, "maxiter": iterations},
             callback=sqp_step,
         )
+        # SLSQP may stop a little outside a constraint: Newton's step along its slope leads back.
+        for _ in range(RESTORATIONS):
+            for g, slope in constraints:
+                short = min(float(g(result.x)), 0.0)
+                direction = np.ravel(slope(result.x))
+                result.x = np.clip(result.x - short * direction / (direction @ direction), 0.0, 1.0)
     else:
         result = _minimize(
             lambda v: float(f(v)),
