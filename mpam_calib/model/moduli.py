@@ -70,7 +70,7 @@ class Law:
         letters["exponential_each"] = letters["exponential"]
         orders = range(1, self.order + 1)
         if self.name == "free":
-            return [f"E_{k}@{level / KPA:g}" for level in np.round(self.levels, 0) for k in orders]
+            return [f"E_{k}@{level / KPA:.0f}" for level in self.levels for k in orders]
         return [f"{letter}_{k}" for letter in letters[self.name] for k in orders]
 
     def coefficient_units(self) -> list[tuple[str, float]]:
