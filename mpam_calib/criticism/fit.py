@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from mpam_calib.criticism.problem import SIZES, Problem
+from mpam_calib.model.bend import BENDS
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.model import build_model
@@ -22,10 +23,20 @@ Array = NDArray[np.float64]
 
 STEP = 1e-4
 ROUNDS = 25
-CONVERGED = 1e-3
-"""Nats below which a round's gain ends the climb."""
-FURTHEST = 7.0
-"""Largest coordinate: seven prior sds."""
+CONVERGED, SHARE = 5e-3, 1e-4
+"""Where the next round promises fewer nats than this, or than this share of the misfit, the climb ends."""
+RIDGE = 0.02
+"""Least damping after a step that led downhill."""
+NUDGE = 1e-4
+"""Step of a force that depends on itself, as a share of the force scale."""
+SETTLED = 0.02
+"""Share of a reading's noise to which a force that depends on itself must have settled."""
+FURTHEST, MOST_BENT = 7.0, 2.5
+"""Largest coordinate (prior sds) of a size, and of a bend."""
+REACH = 1.5
+"""Longest step of a coordinate, prior sds."""
+COARSE = 0.01
+"""Share of the misfit below which the sizes have settled well enough to let them bend."""
 
 
 @dataclass(frozen=True)
@@ -77,10 +88,8 @@ def fit(
     chain = chain_for((blueprint or problem.blueprint).model_dump_json(), effects)
     names = tuple(p.name for p in chain.parameters)
     d, p, n = len(names), chain.linear_size, len(problem)
-    root = problem.roots[size]
-
-    def whiten(x: Array) -> Array:
-        return np.asarray(linalg.solve_triangular(root, x, lower=True, check_finite=False))
+    axes, spread = problem.axes[0], problem.spreads[size][:, None]
+    still = SETTLED * problem.noise_level.total
 
     def terms(u: Array, guide: Array) -> tuple[Array, Array]:
         values = {q.name: q.prior.from_normal(u[:, i : i + 1]) for i, q in enumerate(chain.parameters)}
@@ -89,18 +98,33 @@ def fit(
         got = chain.terms(values, problem.readings, guide)
         fixed = np.broadcast_to(got.fixed, (len(u), 2 * n))
         columns = np.broadcast_to(got.columns, (len(u), 2 * n, p))
-        return 0.5 * (fixed[:, :n] + fixed[:, n:]), 0.5 * (columns[:, :n] + columns[:, n:])
+        return fixed, columns
 
     u: Array = np.array([(start or {}).get(name, 0.0) for name in names], dtype=np.float64)
     eta: Array = np.zeros(p)
     guide = np.concatenate([problem.force, problem.force])
     best: tuple[float, Array, Array, Array, Array, Array] | None = None
     damping = 1e-3
+    bends = np.array([BENDS in name for name in names], dtype=bool)
+    furthest = np.where(bends, MOST_BENT, FURTHEST)
+    released = not bends.any() or bool(np.any(u[bends] != 0.0))
     offsets = np.concatenate([np.zeros((1, d)), STEP * np.eye(d)])
-    for _ in range(ROUNDS):
-        fixed, columns = terms(u + offsets, guide)
-        X = whiten(columns[0])
-        residual = whiten(problem.force - fixed[0])
+    nudge = NUDGE * problem.force_scale
+    for turn in range(ROUNDS):
+        if chain.uses_force:
+            fixed, columns = terms(u + np.concatenate([offsets, offsets[:1]]), _nudged(guide, d + 2, nudge))
+            # A force that depends on itself, F = f(F): one Newton step of its fixed point, for all at once.
+            slope = (fixed[-1] - fixed[0] + (columns[-1] - columns[0]) @ eta) / nudge
+            factor = 1.0 / np.clip(1.0 - slope, 0.2, 5.0)
+            fixed = guide + (fixed[:-1] - guide) * factor
+            columns = columns[:-1] * factor[:, None]
+        else:
+            fixed, columns = terms(u + offsets, guide)
+        whole, whole_columns = fixed[0], columns[0]
+        fixed = 0.5 * (fixed[:, :n] + fixed[:, n:])
+        columns = 0.5 * (columns[:, :n] + columns[:, n:])
+        white = (axes @ np.column_stack([problem.force - fixed[0], columns[0]])) / spread
+        residual, X = white[:, 0], white[:, 1:]
         # Given the sizes, the moduli's optimum is exact.
         gram = X.T @ X + np.eye(p)
         eta = np.asarray(linalg.solve(gram, X.T @ residual, assume_a="pos")) if p else eta
@@ -109,25 +133,36 @@ def fit(
         if not np.isfinite(objective):
             objective = -np.inf
         if best is None or objective > best[0]:
-            gain = np.inf if best is None else objective - best[0]
             force = fixed[0] + columns[0] @ eta
             moved = (fixed[1:] - fixed[0]) + (columns[1:] - columns[0]) @ eta
-            J = np.concatenate([whiten(moved.T) / STEP, X], axis=1)
+            J = np.concatenate([(axes @ moved.T) / (STEP * spread), X], axis=1)
             best = (objective, u, eta, J, residual, force)
             damping = max(damping / 5.0, 1e-6)
             # What depends on the force is fed with the model's own.
-            guide = np.concatenate([force, force])
-            if gain < CONVERGED or d == 0:
-                break
+            own = whole + whole_columns @ eta
+            waiting = chain.uses_force and float(np.abs(own - guide).max()) > still
+            guide = own
         else:
-            damping *= 8.0
+            waiting = False
+            damping = max(8.0 * damping, RIDGE)
             if damping > 1e4:
                 break
         _, at, at_eta, J, residual, _ = best
         hessian = J.T @ J + np.eye(d + p)
         gradient = J.T @ residual - np.concatenate([at, at_eta])
-        step = linalg.solve(hessian + damping * np.diag(np.diagonal(hessian)), gradient, assume_a="pos")
-        u = np.clip(at + step[:d], -FURTHEST, FURTHEST)
+        enough = max(CONVERGED, SHARE * float(residual @ residual))
+        free = np.ones(d + p, dtype=bool)
+        free[:d] = ((np.abs(at) < furthest) | (at * gradient[:d] < 0.0)) & (released | ~bends)
+        damped = hessian[np.ix_(free, free)] + damping * np.diag(np.diagonal(hessian)[free])
+        step = np.zeros(d + p)
+        step[free] = linalg.solve(damped, gradient[free], assume_a="pos")
+        promise = 0.5 * float(step @ gradient)
+        if d == 0 or (promise < enough and not waiting and released):
+            break
+        # Sizes first: the bend of a size near zero says nothing and wanders off.
+        released = released or promise < COARSE * float(residual @ residual)
+        step *= min(1.0, REACH / float(np.abs(step[:d]).max(initial=1e-9)))
+        u = np.clip(at + step[:d], -furthest, furthest)
     assert best is not None
     objective, u, eta, J, residual, force = best
     hessian = J.T @ J + np.eye(d + p)
@@ -136,6 +171,13 @@ def fit(
     evidence = objective - 0.5 * (problem.log_dets[size] + n * np.log(2.0 * np.pi) + log_det)
     covariance = np.asarray(linalg.cho_solve(factor, np.eye(d + p)))
     return Fit(effects, size, names, u, eta, covariance, force, float(evidence), float(residual @ residual))
+
+
+def _nudged(guide: Array, copies: int, nudge: float) -> Array:
+    """The guide (2n,) for every row of a batch (copies, 2n), the last one moved."""
+    rows = np.repeat(guide[None, :], copies, axis=0)
+    rows[-1] += nudge
+    return rows
 
 
 def sizes_in_play() -> range:

@@ -103,14 +103,29 @@ class Problem:
         return self.noise + (size * self.force_scale) ** 2 * self.kernel
 
     @cached_property
-    def roots(self) -> list[Array]:
-        """Cholesky factors of the covariance for each of SIZES."""
-        return [np.asarray(linalg.cholesky(self.covariance(size), lower=True)) for size in SIZES]
+    def axes(self) -> tuple[Array, Array, float]:
+        """Axes (n, n) that whiten the noise and part the remainder, its powers (n,) along them, ln|noise|.
+
+        For every size of the remainder the covariance is diagonal on them: 1 + (size·force scale)²·power.
+        """
+        root = np.asarray(linalg.cholesky(self.noise, lower=True))
+        half = linalg.solve_triangular(root, self.kernel, lower=True)
+        whitened = linalg.solve_triangular(root, half.T, lower=True)
+        powers, turns = linalg.eigh(0.5 * (whitened + whitened.T))
+        axes = linalg.solve_triangular(root, turns, lower=True, trans="T").T
+        log_det = 2.0 * float(np.sum(np.log(np.diagonal(root))))
+        return np.ascontiguousarray(axes), np.maximum(powers, 0.0), log_det
+
+    @cached_property
+    def spreads(self) -> list[Array]:
+        """Standard deviations along the axes for each of SIZES."""
+        powers = self.axes[1]
+        return [np.sqrt(1.0 + (size * self.force_scale) ** 2 * powers) for size in SIZES]
 
     @cached_property
     def log_dets(self) -> list[float]:
         """ln|C| for each of SIZES."""
-        return [2.0 * float(np.sum(np.log(np.diagonal(root)))) for root in self.roots]
+        return [self.axes[2] + 2.0 * float(np.sum(np.log(spread))) for spread in self.spreads]
 
 
 def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:

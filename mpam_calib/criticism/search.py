@@ -14,10 +14,10 @@ from math import comb, log
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
+from mpam_calib.model.bend import FORM
 from mpam_calib.model.effect import effect
 
 Array = NDArray[np.float64]
@@ -41,30 +41,23 @@ class Search:
     problem: Problem
     tested: tuple[str, ...]
     fits: dict[tuple[Set, int], Fit] = field(default_factory=dict)
-    form: dict[str, str] = field(default_factory=dict)
-    """The form in which each effect did best alone."""
 
     def refit(self, effects: Set, size: int, starts: Iterable[dict[str, float]] = ({},)) -> Fit:
         """The best exact refit of a set: over its effects' forms and from some starts.
 
-        A single effect is tried in all its forms; a larger set in those that its parts were best in, and
-        then with one form changed at a time. Having had a choice of forms is paid for.
+        The search goes by bent forms, which hold most shapes; :meth:`polish` then tries the others one at
+        a time. Having had a choice of forms is paid for.
         """
         key = (effects, size)
         if key in self.fits:
             return self.fits[key]
-        tried = [{e: self.form.get(e, e) for e in effects}]
-        if len(effects) == 1:
-            tried = [{e: form} for e in effects for form in forms_of(e)]
+        choice = {e: flexible(e) for e in effects}
         best: Fit | None = None
-        for choice in tried:
-            for start in [*starts, *self._inherited(effects, size)]:
-                best = self._better(best, choice, size, start)
+        for start in [*starts, *self._inherited(effects, size)]:
+            best = self._better(best, choice, size, start)
         if best is None:
             raise np.linalg.LinAlgError(f"no fit of {sorted(effects)}")
         self.fits[key] = best
-        if len(effects) == 1 and size == self.best_size(effects):
-            self.form.update({e.partition(":")[0]: e for e in best.effects})
         return best
 
     def polish(self, effects: Set, size: int) -> None:
@@ -169,7 +162,7 @@ def _try(found: Search, effects: Set, sizes: Iterable[int], curved: bool = False
     starts: list[dict[str, float]] = [{}]
     if curved:
         names = _own_names(found.problem, effects)
-        starts += [dict.fromkeys(names, value) for value in STARTS]
+        starts += [dict.fromkeys(names, value) for value in STARTS] if names else []
     for size in sizes:
         try:
             found.refit(effects, size, starts)
@@ -177,10 +170,17 @@ def _try(found: Search, effects: Set, sizes: Iterable[int], curved: bool = False
             continue
 
 
+def flexible(identifier: str) -> str:
+    """The form that holds most shapes of an effect."""
+    return f"{identifier}:{FORM}" if effect(identifier).bends else identifier
+
+
 @lru_cache
 def forms_of(identifier: str) -> tuple[str, ...]:
     """The effect's id as it is, and with each of its other forms."""
-    return (identifier, *(f"{identifier}:{form}" for form in effect(identifier).forms))
+    item = effect(identifier)
+    bent = (FORM,) if item.bends else ()
+    return (identifier, *(f"{identifier}:{form}" for form in (*bent, *item.forms)))
 
 
 def _own_names(problem: Problem, effects: Set) -> list[str]:
@@ -213,8 +213,8 @@ def _gain(found: Search, effects: Set, partner: str, size: int) -> float:
     nothing = found.fits.get((frozenset(), size))
     if single is None or nothing is None:
         return -np.inf
-    root = found.problem.roots[size]
-    signature = linalg.solve_triangular(root, single.force - nothing.force, lower=True)
-    residual = linalg.solve_triangular(root, found.problem.force - base.force, lower=True)
+    axes, spread = found.problem.axes[0], found.problem.spreads[size]
+    signature = axes @ (single.force - nothing.force) / spread
+    residual = axes @ (found.problem.force - base.force) / spread
     power = float(signature @ signature)
     return 0.5 * float(signature @ residual) ** 2 / power if power > 1e-12 else 0.0

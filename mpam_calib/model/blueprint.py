@@ -7,6 +7,7 @@ from it, so that all of them share one prior.
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
@@ -49,7 +50,8 @@ class Blueprint(Value):
 
     ``stroke`` (m) is the largest recorded displacement, ``reach`` the largest contraction at each
     level, ``pulls_at`` (Pa) the lowest pressure with a clear pull, ``stroke_time`` (s) the median
-    duration of a stroke (None without loops) and ``reading_time`` (s) that between two readings.
+    duration of a stroke (None without loops) ``reading_time`` (s) that between two readings,
+    ``duration`` (s) that of the whole test and ``level_time`` (s) the longest at one level.
     """
 
     simulation: Simulation
@@ -62,6 +64,8 @@ class Blueprint(Value):
     pulls_at: float
     stroke_time: float | None
     reading_time: float
+    duration: float = 0.0
+    level_time: float = 0.0
     branches: bool
     free_contraction: bool
     tensile_range: tuple[float, float] | None
@@ -84,6 +88,8 @@ class Blueprint(Value):
             pressure_bias_sd=self.sensors.pressure_bias_sd,
             nuisances=self.options.nuisances,
             pulls_at=self.pulls_at,
+            duration=self.duration,
+            level_time=self.level_time,
         )
 
 
@@ -110,6 +116,8 @@ def draw_blueprint(
         pulls_at=_pulls_at(specimen),
         stroke_time=None if loops is None else _stroke_time(loops),
         reading_time=0.0 if loops is None else max(float(np.median(np.diff(loops.time_s))), 1e-6),
+        duration=0.0 if loops is None else float(loops.time_s.max()),
+        level_time=0.0 if loops is None else _level_time(loops),
         branches=any(p is not None and bool(np.any(np.abs(p.branch) == 1)) for p in parts),
         free_contraction=specimen.free_contraction is not None,
         tensile_range=_tensile_range(specimen),
@@ -162,3 +170,8 @@ def _stroke_time(loops: Loops) -> float:
     starts = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
     ends = np.append(starts[1:], len(loops.stroke)) - 1
     return float(np.median(np.maximum(loops.time_s[ends] - loops.time_s[starts], 1e-3)))
+
+
+def _level_time(loops: Loops) -> float:
+    spans = pd.Series(loops.time_s).groupby(loops.level)
+    return float((spans.max() - spans.min()).max())

@@ -24,7 +24,7 @@ from mpam_calib.model.readings import Readings
 from mpam_calib.model.reference import rest_of
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.friction import coulomb_factor, strand_friction_per_f_s
-from mpam_calib.physics.kinematics import SHAPES, Shape
+from mpam_calib.physics.kinematics import SHAPES, Shape, swollen
 from mpam_calib.physics.statics import gas_force, modulus_columns, thickness_force
 
 Array = NDArray[np.float64]
@@ -91,15 +91,23 @@ class Chain:
         force itself (the sign in Coulomb's law, a fixture's give); without one the muscle pulls and
         the fixture is stiff.
         """
+        fixed, slope, columns = self.factored(values, readings, guide)
+        return Terms(fixed, np.broadcast_to(slope, fixed.shape)[..., None] * columns)
+
+    def factored(
+        self, values: Values, readings: Readings, guide: Array | None = None
+    ) -> tuple[Array, Array, Array]:
+        """:meth:`terms` as (fixed, slope, columns): F = fixed + slope·(columns·η).
+
+        The slope (B or 1, n) is what friction and gain make of the muscle's own force; the columns are
+        (1, n, p) where no parameter changes them.
+        """
         known = np.ones(len(readings)) if guide is None else guide
         state, shape = self._to_shape(values, readings, np.zeros(len(readings)) if guide is None else guide)
         fixed, columns = self._statics(state, shape, values)
         state = self._to_sensor(state, values)
         slope = state.gain * coulomb_factor(state.friction_gain * state.coulomb, state.sign, np.sign(known))
-        return Terms(
-            slope * fixed + self._strand_force(state) + state.zero,
-            (slope + np.zeros(fixed.shape))[..., None] * columns,
-        )
+        return slope * fixed + self._strand_force(state) + state.zero, slope, columns
 
     def force(self, values: Values, eta: Array, readings: Readings) -> Array:
         """Force (B, n), N, for coordinates η (B, p): exact, by fixed point where effects need the force."""
@@ -125,7 +133,7 @@ class Chain:
         state = replace(state, length=state.rest.L0 - state.displacement)
         state = self._stage(Stage.SHAPE, state, values)
         length = np.maximum(state.length, 0.05 * state.rest.L0)
-        shape = SHAPES[state.kinematics](length, state.rest)
+        shape = swollen(SHAPES[state.kinematics](length, state.rest), state.rest, state.swell)
         return replace(state, shape=shape), shape
 
     def _statics(self, state: State, shape: Shape, values: Values) -> tuple[Array, Array]:
@@ -172,6 +180,7 @@ class Chain:
             displacement=readings.displacement[None, :],
             rest=rest_of(geometry),
             kinematics=self.setting.simulation.kinematics,
+            swell=one,
             length=zero,
             shape=None,
             wall_factor=one,

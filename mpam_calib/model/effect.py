@@ -14,6 +14,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from mpam_calib.model.bend import FORM, bend_factor, bend_parameters
 from mpam_calib.model.effect_ids import add_effect_id, load_outside_effects
 from mpam_calib.model.priors import Parameter
 from mpam_calib.model.state import Setting, State
@@ -42,7 +43,9 @@ class Effect:
     the priors for a setting; ``apply`` returns the changed state. ``forms`` are other shapes of
     the same thing with the same parameters, declared as ``id:form``. ``uses_force`` is set where it
     needs the muscle's own force (a fixture that gives way), which the chain then finds by fixed
-    point. ``needs_braid`` is set where it needs the declared strands.
+    point. ``needs_braid`` is set where it needs the declared strands. ``bends`` names the drivers (and
+    degrees) along which its first parameter may vary in the form ``id:bent``
+    (:mod:`mpam_calib.model.bend`); an effect without parameters then reads its size under its own id.
     """
 
     id: str
@@ -55,6 +58,7 @@ class Effect:
     forms: Mapping[str, Callable[[State, Values, Setting], State]] = field(default_factory=dict)
     uses_force: bool = False
     needs_braid: bool = False
+    bends: Mapping[str, int] = field(default_factory=dict)
 
 
 _REGISTRY: dict[str, Effect] = {}
@@ -74,7 +78,27 @@ def effect(identifier: str) -> Effect:
     _load_catalogue()
     base, _, form = identifier.partition(":")
     found = _REGISTRY[base]
+    if form == FORM and found.bends:
+        return _bent(found)
     return replace(found, id=identifier, apply=found.forms[form]) if form else found
+
+
+def _bent(item: Effect) -> Effect:
+    """The effect with a size that varies smoothly along its drivers."""
+
+    def parameters(setting: Setting) -> tuple[Parameter, ...]:
+        own = item.parameters(setting)
+        name = own[0].name if own else item.id
+        return (*own, *bend_parameters(name, item.bends, constant=not own))
+
+    def apply(state: State, values: Values, setting: Setting) -> State:
+        own = item.parameters(setting)
+        name = own[0].name if own else item.id
+        size = values[name] if own else np.ones((1, 1))
+        factor = bend_factor(name, item.bends, values, state, setting)
+        return item.apply(state, {**values, name: size * factor}, setting)
+
+    return replace(item, id=f"{item.id}:{FORM}", parameters=parameters, apply=apply)
 
 
 def known_effects() -> tuple[str, ...]:

@@ -28,18 +28,19 @@ EFFECT_IDS: Final[tuple[str, ...]] = (
 """Ids of the effects that ship with the package."""
 
 EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
-    "dead_band": ("soft",),
-    "tip_shape": ("implicit",),
-    "strand_friction": ("proportional",),
-    "rate_friction": ("linear", "power"),
-    "presliding": ("rest", "tanh", "slow"),
-    "stress_softening": ("force", "power", "stretched"),
-    "creep": ("power", "settling"),
-    "force_drift": ("settling", "square"),
-    "pressure_droop": ("square",),
-    "rig_compliance": ("stiffening",),
+    **{identifier: ("bent",) for identifier in EFFECT_IDS},
+    "dead_band": ("bent", "soft"),
+    "tip_shape": ("bent", "implicit"),
+    "strand_friction": ("bent", "proportional"),
+    "rate_friction": ("bent", "linear", "power"),
+    "presliding": ("bent", "rest", "tanh", "slow"),
+    "stress_softening": ("bent", "force", "power", "stretched"),
+    "creep": ("bent", "power", "settling"),
+    "force_drift": ("bent", "settling", "square"),
+    "pressure_droop": ("bent", "square"),
+    "rig_compliance": ("bent", "stiffening"),
 }
-"""Other forms of some effects, declared as ``id:form``."""
+"""Other forms of the effects, declared as ``id:form``."""
 
 OUTSIDE: Final = "mpam_calib.effects"
 """Entry-point group under which another package names a module that registers effects on import."""

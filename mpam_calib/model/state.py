@@ -35,6 +35,10 @@ class Setting:
     """Whether declared uncertainties are sampled."""
     pulls_at: float = np.inf
     """The lowest pressure (Pa) at which the recordings show the muscle pulling."""
+    duration: float = 0.0
+    """Length of the whole test, s."""
+    level_time: float = 0.0
+    """Longest time spent at one level, s."""
 
     @property
     def top_pressure(self) -> float:
@@ -47,7 +51,7 @@ class State:
     """Arrays of shape (B, n) or broadcastable to it: B parameter vectors, n readings.
 
     rig: ``pressure`` (Pa) and ``displacement`` (m) that the muscle really sees.
-    shape: ``rest``, ``kinematics``, the working ``length`` (m) and, once solved, the ``shape``.
+    shape: ``rest``, ``kinematics``, ``swell`` (factor on the radius's growth), the working ``length`` (m) and, once solved, the ``shape``.
     statics: ``wall_factor`` on the thickness term, ``lost`` (N) to be subtracted.
     friction: ``sign`` s (fractions while it turns over), ``coulomb`` K and ``strand`` f_s.
     history: ``wall_gain`` on the bladder's stress and ``gain`` on the whole force.
@@ -60,6 +64,7 @@ class State:
     displacement: Array
     rest: Rest
     kinematics: str
+    swell: Array
     length: Array
     shape: Shape | None
     wall_factor: Array

@@ -79,6 +79,17 @@ def shape_constant_thickness(L: Array, rest: Rest) -> Shape:
     return Shape(L, R, rest.t0 + np.zeros_like(R), tan2_braid_angle(L, rest))
 
 
+def swollen(shape: Shape, rest: Rest, factor: Array) -> Shape:
+    """A shape whose radius grows ``factor`` times as much, R0 + factor·(R − R0), its wall's volume kept.
+
+    Strands that lie a distance δ outside the bladder's surface give factor 1 + δ/R0 (Eq. 2.10 for R + δ).
+    """
+    if np.all(factor == 1.0):
+        return shape
+    R = np.maximum(rest.R0 + factor * (shape.R - rest.R0), 1e-3 * rest.R0)
+    return Shape(shape.L, R, wall_at_constant_volume(shape.L, R, rest), shape.T)
+
+
 def tip_shortened_length(L: Array, R: Array, rest: Rest, factor: Array) -> Array:
     """Working length (m) with rounded tips: L′ = L − 2·factor·(π/2 − 1)(R − R0) (thesis Eq. 2.46-2.47)."""
     return L - 2.0 * factor * (np.pi / 2.0 - 1.0) * (R - rest.R0)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.white import Nodes
 from mpam_calib.specimen.recording import Loops
 
 Array = NDArray[np.float64]
@@ -26,6 +27,8 @@ UNREDUCED = 16
 """Strokes of up to so many readings are left as they are."""
 CHUNK = 32
 """At most so many consecutive readings of a bin tell of the fast noise."""
+AT_REST = 0.05
+"""Below this share of its stroke's mean speed the crosshead rests."""
 SLACK_SHARE = 0.2
 """A bin with this share of its readings at or below the floor says "slack", not a value."""
 
@@ -38,7 +41,8 @@ class LoopBins:
     reading (N); ``count`` its number of rows; ``segment`` and ``position`` place a bin in the padded
     (segments, width) layout; ``start``, ``stop`` (s) are its first and last row's times and ``dt``
     (segments,) the time between rows; ``slack`` marks bins at the floor. ``scatter`` is
-    (Σ c cᵀ over chunks, their number, the contrast matrix Q, dt) of the detrended fast residuals, or None.
+    (Σ c cᵀ over chunks, their number, the contrast matrix Q, dt) of the detrended fast residuals, or None;
+    ``nodes`` are what white noise alone needs, ``outward`` (n,) is 1 where a bin contracts, else −1.
     """
 
     readings: Readings
@@ -53,6 +57,8 @@ class LoopBins:
     contraction_scale: float
     scatter: tuple[Array, int, Array, float] | None
     averaged: int
+    nodes: Nodes
+    outward: Array
 
     def __len__(self) -> int:
         return len(self.force)
@@ -115,8 +121,9 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
         "time_at_level": mean(at_level),
         "cycle": loops.cycle[starts].astype(np.float64),
         "reversal": reversal[segment],
-        "speed": speed[segment],
+        "speed": mean(speed),
     }
+    middle = Readings(displacement=displacement, travel=bin_travel, **common)
     halves = [
         Readings(
             displacement=displacement + side * direction * spread,
@@ -136,11 +143,38 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
         start=loops.time_s[starts],
         stop=loops.time_s[stops - 1],
         dt=np.maximum(dt, 1e-9),
-        slack=mean(loops.censored.astype(np.float64)) >= SLACK_SHARE,
+        slack=_beyond_slack(
+            mean(loops.censored.astype(np.float64)) >= SLACK_SHARE,
+            displacement,
+            segment,
+            2 * loops.level[starts] + (direction > 0),
+        ),
         contraction_scale=float(np.ptp(displacement)) or 1.0,
         scatter=_scatter(loops, starts, stops, segment, position, dt),
         averaged=loops.averaged,
+        nodes=Nodes.build(loops.force_N, loops.pressure_Pa, loops.displacement_m, starts, middle, direction),
+        outward=direction,
     )
+
+
+def _beyond_slack(
+    slack: NDArray[np.bool_], displacement: Array, segment: Ints, group: Ints
+) -> NDArray[np.bool_]:
+    """Slack bins, and those of the same level and branch that are contracted further.
+
+    Past the floor the readings are its noise, half of it above: a bin of a few readings may show none at the
+    floor and is slack all the same. A stroke's slack begins at its first slack bin, a group's at the median.
+    """
+    if not slack.any():
+        return slack
+    found = slack.copy()
+    for one in np.unique(group[slack]):
+        inside = group == one
+        first = [
+            displacement[slack & inside & (segment == j)].min() for j in np.unique(segment[slack & inside])
+        ]
+        found |= inside & (displacement >= np.median(first))
+    return found
 
 
 def row_readings(loops: Loops) -> Readings:
@@ -159,12 +193,12 @@ def row_readings(loops: Loops) -> Readings:
         cycle=loops.cycle.astype(np.float64),
         travel=travel,
         reversal=reversal[segment],
-        speed=speed[segment],
+        speed=speed,
     )
 
 
 def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array, Array]:
-    """Travel since the turn (rows), whether a reversal began the stroke, its speed, time at the level."""
+    """Travel since the turn (rows), whether a reversal began the stroke, speed (rows), time at the level."""
     segment = np.repeat(np.arange(len(first)), lengths)
     same_level = np.zeros(len(first), dtype=bool)
     same_level[1:] = (loops.level[first][1:] == loops.level[first][:-1]) & (
@@ -187,7 +221,23 @@ def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Ar
     run = np.cumsum(~same_level) - 1
     level_start = loops.time_s[first][~same_level]
     at_level = loops.time_s - level_start[run][segment]
-    return travel, (same_level & opposite).astype(np.float64), speed, at_level
+    return travel, (same_level & opposite).astype(np.float64), _speed(loops, first, last, segment), at_level
+
+
+def _speed(loops: Loops, first: Ints, last: Ints, segment: Ints) -> Array:
+    """Speed at every row (m/s), over a fortieth of the stroke to either side; at rest, that of the stroke."""
+    rows = np.arange(len(segment))
+    window = np.maximum((last - first + 1) // 40, 1)[segment]
+    before, after = np.maximum(rows - window, first[segment]), np.minimum(rows + window, last[segment])
+    elapsed = np.maximum(loops.time_s[after] - loops.time_s[before], 1e-9)
+    local = np.abs(loops.displacement_m[after] - loops.displacement_m[before]) / elapsed
+    mean = np.add.reduceat(local, first) / (last - first + 1)
+    moving = local >= AT_REST * mean[segment]
+    # A friction that depends on speed does not vanish where the crosshead stops for a while.
+    typical = np.add.reduceat(np.where(moving, local, 0.0), first) / np.maximum(
+        np.add.reduceat(moving.astype(np.float64), first), 1.0
+    )
+    return np.where(moving, local, typical[segment])
 
 
 def _scatter(

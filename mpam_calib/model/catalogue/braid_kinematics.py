@@ -14,7 +14,8 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    return replace(state, kinematics="inextensible_braid")
+    # Bent, the strands may lie outside the surface, and the radius then grows more than Eq. 2.10 says.
+    return replace(state, kinematics="inextensible_braid", swell=values.get("braid_kinematics", state.swell))
 
 
 register(
@@ -26,5 +27,6 @@ register(
         source="thesis Eq. 2.10, 2.23 in place of Eq. 4.16",
         parameters=_parameters,
         apply=_apply,
+        bends={"contraction": 1},
     )
 )

@@ -31,5 +31,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         needs_braid=True,
+        bends={"contraction": 1, "pressure": 1},
     )
 )

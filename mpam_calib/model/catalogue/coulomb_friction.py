@@ -34,5 +34,6 @@ register(
         source="thesis Eq. 2.44",
         parameters=_parameters,
         apply=_apply,
+        bends={"force": 1, "pressure": 1},
     )
 )

@@ -52,5 +52,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"power": _power, "settling": _settling},
+        bends={"level_time": 2},
     )
 )

@@ -46,5 +46,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"soft": _soft},
+        bends={"pressure": 2},
     )
 )

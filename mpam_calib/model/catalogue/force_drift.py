@@ -24,7 +24,7 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
 def _settling(state: State, values: Values, setting: Setting) -> State:
     """A warm-up: the wander slows down, with a third of the test as its time constant."""
     time = state.readings.time
-    constant = max(float(time.max(initial=0.0)), 1.0) / 3.0
+    constant = max(setting.duration, 1.0) / 3.0
     wander = values["drift_N_per_min"] * constant * -np.expm1(-time / constant)
     return replace(state, zero=state.zero + wander)
 
@@ -32,7 +32,7 @@ def _settling(state: State, values: Values, setting: Setting) -> State:
 def _square(state: State, values: Values, setting: Setting) -> State:
     """A wander that speeds up, as fast as the linear one on average."""
     time = state.readings.time
-    wander = values["drift_N_per_min"] * time**2 / max(float(time.max(initial=0.0)), 1.0)
+    wander = values["drift_N_per_min"] * time**2 / max(setting.duration, 1.0)
     return replace(state, zero=state.zero + wander)
 
 
@@ -46,5 +46,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"settling": _settling, "square": _square},
+        bends={"time": 2},
     )
 )

@@ -30,5 +30,6 @@ register(
         source="bladder stress × (1 + bend·Legendre polynomial in pressure)",
         parameters=_parameters,
         apply=_apply,
+        bends={"pressure": 2},
     )
 )

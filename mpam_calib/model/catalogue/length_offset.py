@@ -28,5 +28,6 @@ register(
         source="true shortening = reading + offset",
         parameters=_parameters,
         apply=_apply,
+        bends={"contraction": 1, "time": 1},
     )
 )

@@ -57,5 +57,6 @@ register(
         source="thesis Eq. 2.12 with M + 1 terms",
         parameters=_parameters,
         apply=_apply,
+        bends={"contraction": 2},
     )
 )

@@ -52,5 +52,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"rest": _from_rest, "tanh": _tanh, "slow": _slow},
+        bends={"travel": 2},
     )
 )

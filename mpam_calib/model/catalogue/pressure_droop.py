@@ -34,5 +34,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"square": _square},
+        bends={"contraction": 2, "pressure": 1},
     )
 )

@@ -54,5 +54,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"linear": _linear, "power": _power},
+        bends={"speed": 2},
     )
 )

@@ -41,5 +41,6 @@ register(
         apply=_apply,
         forms={"stiffening": _stiffening},
         uses_force=True,
+        bends={"force": 2},
     )
 )

@@ -44,5 +44,6 @@ register(
         apply=_apply,
         forms={"proportional": _proportional},
         needs_braid=True,
+        bends={"pressure": 1, "contraction": 1},
     )
 )

@@ -53,5 +53,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"force": _force, "power": _power, "stretched": _stretched},
+        bends={"cycle": 1, "contraction": 1},
     )
 )

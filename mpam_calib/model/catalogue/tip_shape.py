@@ -47,5 +47,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"implicit": _implicit},
+        bends={"contraction": 2},
     )
 )

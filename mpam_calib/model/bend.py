@@ -1,0 +1,92 @@
+"""Bent effects: the same cause with a shape of its own.
+
+No rig follows an equation to the letter: a fixture stiffens, relaxation is no straight line over the
+logarithm of time. An effect declared as ``id:bent`` has its size multiplied by a smooth positive
+function of what drives it, exp(Σ c_j P_j(v)), with Legendre polynomials P_j of a driver v in about
+−1..1 (the contraction, the pressure, the time ...) and c_j ~ N(0, (BEND/j)²). So a name survives an
+equation that is not quite the real one, and pays for the freedom in its evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.state import Setting, State
+from mpam_calib.units import MINUTE, MM
+
+Array = NDArray[np.float64]
+
+FORM: Final = "bent"
+"""The form's name: ``id:bent``."""
+BENDS: Final = "_bend_"
+"""What the names of its coefficients hold."""
+BEND: Final = 0.3
+"""Prior sd of the first bend: a size that differs by ±30 % between the two ends of its driver."""
+MOST: Final = 1.5
+"""Largest logarithm of the factor, whatever the coefficients."""
+TURN_SHARE: Final = 0.03
+"""Share of the stroke after which a turn is half over, for the driver ``travel``."""
+SPEED: Final = 50.0 * MM / MINUTE
+"""Speed at which the driver ``speed`` is zero (the thesis's)."""
+
+
+def _pressure(state: State, setting: Setting) -> Array:
+    low, high = float(setting.levels[0]), setting.top_pressure
+    return (2.0 * state.readings.pressure - low - high) / max(high - low, 1.0)
+
+
+def _speed(state: State, setting: Setting) -> Array:
+    speed = np.where(state.readings.speed > 0.0, state.readings.speed, SPEED)
+    return np.asarray(np.log10(speed / SPEED))
+
+
+def _travel(state: State, setting: Setting) -> Array:
+    travel = state.readings.travel
+    return 2.0 * travel / (travel + TURN_SHARE * setting.stroke) - 1.0
+
+
+DRIVERS: Final[Mapping[str, Callable[[State, Setting], Array]]] = {
+    "contraction": lambda state, setting: 2.0 * state.readings.displacement / setting.stroke - 1.0,
+    "pressure": _pressure,
+    "force": lambda state, setting: np.abs(state.guide) / setting.force_scale - 1.0,
+    "time": lambda state, setting: 2.0 * state.readings.time / max(setting.duration, 1.0) - 1.0,
+    "level_time": lambda state, setting: (
+        2.0 * np.log1p(state.readings.time_at_level) / np.log1p(max(setting.level_time, 1.0)) - 1.0
+    ),
+    "cycle": lambda state, setting: 2.0 / state.readings.cycle - 1.0,
+    "speed": _speed,
+    "travel": _travel,
+}
+"""What a shape may bend with, in about −1..1 over the recordings: (n,) or (B, n)."""
+
+
+def bend_parameters(name: str, bends: Mapping[str, int], constant: bool) -> tuple[Parameter, ...]:
+    """The coefficients c_j of a size called ``name``; with a constant one where the size itself is none."""
+    found = [Parameter(f"{name}{BENDS}0", Normal(0.0, BEND), "logarithm of the size", "", "")] if constant else []
+    number = 0
+    for driver, degree in bends.items():
+        for j in range(1, degree + 1):
+            number += 1
+            meaning = f"bend of the shape along {driver.replace('_', ' ')}, degree {j}"
+            found.append(Parameter(f"{name}{BENDS}{number}", Normal(0.0, BEND / j), meaning, "", ""))
+    return tuple(found)
+
+
+def bend_factor(
+    name: str, bends: Mapping[str, int], values: Mapping[str, Array], state: State, setting: Setting
+) -> Array:
+    """exp(Σ c_j P_j(v)) for every reading, (B, n)."""
+    log: Array = np.asarray(values.get(f"{name}{BENDS}0", np.zeros((1, 1))))
+    number = 0
+    for driver, degree in bends.items():
+        v = np.clip(DRIVERS[driver](state, setting), -1.5, 1.5)
+        for j in range(1, degree + 1):
+            number += 1
+            log = log + values[f"{name}{BENDS}{number}"] * legendre.legval(v, [0.0] * j + [1.0])
+    return np.exp(np.clip(log, -MOST, MOST))
