@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
-from mpam_calib.posterior.white import Nodes
 from mpam_calib.specimen.recording import Loops
 
 Array = NDArray[np.float64]
@@ -41,8 +40,7 @@ class LoopBins:
     reading (N); ``count`` its number of rows; ``segment`` and ``position`` place a bin in the padded
     (segments, width) layout; ``start``, ``stop`` (s) are its first and last row's times and ``dt``
     (segments,) the time between rows; ``slack`` marks bins at the floor. ``scatter`` is
-    (Σ c cᵀ over chunks, their number, the contrast matrix Q, dt) of the detrended fast residuals, or None;
-    ``nodes`` are what white noise alone needs, ``outward`` (n,) is 1 where a bin contracts, else −1.
+    (Σ c cᵀ over chunks, their number, the contrast matrix Q, dt) of the detrended fast residuals, or None.
     """
 
     readings: Readings
@@ -57,8 +55,6 @@ class LoopBins:
     contraction_scale: float
     scatter: tuple[Array, int, Array, float] | None
     averaged: int
-    nodes: Nodes
-    outward: Array
 
     def __len__(self) -> int:
         return len(self.force)
@@ -123,7 +119,6 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
         "reversal": reversal[segment],
         "speed": mean(speed),
     }
-    middle = Readings(displacement=displacement, travel=bin_travel, **common)
     halves = [
         Readings(
             displacement=displacement + side * direction * spread,
@@ -152,8 +147,6 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
         contraction_scale=float(np.ptp(displacement)) or 1.0,
         scatter=_scatter(loops, starts, stops, segment, position, dt),
         averaged=loops.averaged,
-        nodes=Nodes.build(loops.force_N, loops.pressure_Pa, loops.displacement_m, starts, middle, direction),
-        outward=direction,
     )
 
 
