@@ -1,7 +1,8 @@
 """Which simulation do the data ask for: order, law, friction, kinematics and strain convention ranked.
 
-By evidence (Laplace, summed over the remainder's sizes) and by whole pressure levels held out; with a
-confusion matrix that says how often the leading models would be told apart with data like these.
+By evidence (summed over the remainder's sizes) and by whole pressure levels held out; with a confusion
+matrix that says how often the leading models would be told apart with data like these. Laplace's evidence
+ranks the whole space, quadrature those near the top, and bridge sampling gives the leading ones an error.
 """
 
 from __future__ import annotations
@@ -17,6 +18,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mpam_calib.criticism.evidence import (
+    WIDTHS,
+    Weighed,
+    log_evidence_by_quadrature,
+    prior_sensitivity,
+    weigh,
+)
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.gain import FOLDS, log_density, predict_rows
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem, build_problem
@@ -33,6 +41,9 @@ LAWS = {"constant": 1, "linear": 2, "exponential": 3, "free": 2}
 HELD_OUT = 24
 """Leading models that are also judged by held-out levels."""
 CONFUSED = 5
+"""Leading models that are told apart, bridged and tried under other priors."""
+NEAR = 20.0
+"""Nats below the best within which Laplace's evidence is replaced by quadrature."""
 STARTS: dict[str, tuple[dict[str, float], ...]] = {
     "exponential": ({}, {"d": 1.0, "gap": -1.0}, {"d": -1.0, "gap": -1.0})
 }
@@ -44,14 +55,18 @@ COLUMNS = [
 
 @dataclass(frozen=True)
 class Selection:
-    """``models`` with the columns of ``models.csv`` (best first) and the confusion of the leading ones.
+    """``models`` with the columns of ``models.csv`` (best first) and more about the leading ones.
 
     ``confusion`` (k, k): share of replicates simulated from row's model in which column's won.
+    ``sensitivity``: their evidences and shares under other prior widths, a row for each model and width.
+    ``disagreement`` (nats): the largest difference between quadrature and bridge among them.
     """
 
     models: pd.DataFrame
     confusion: Array
     replicates: int
+    sensitivity: pd.DataFrame
+    disagreement: float
 
 
 @dataclass(frozen=True)
@@ -59,6 +74,8 @@ class _Ranked:
     simulation: Simulation
     fits: list[Fit]
     log_evidence: float
+    error: float = float("nan")
+    """Standard error of the evidence (nats), where a bridge gave one."""
 
     @property
     def best(self) -> Fit:
@@ -111,14 +128,28 @@ def select(
             listener("ranking", (number + 1) / len(space))
             if item is not None:
                 ranked.append(item)
+        listener("integrating", 0.0)
+        near = max(r.log_evidence for r in ranked) - NEAR
+        ranked = list(pool.map(_integrate, ranked, [near] * len(ranked), chunksize=4))
         ranked.sort(key=lambda r: -r.log_evidence)
+        weighed = list(pool.map(_weigh, ranked[:CONFUSED], [seed] * CONFUSED))
+        ranked[:CONFUSED] = [_bridged(r, w) for r, w in zip(ranked, weighed, strict=False)]
+        ranked.sort(key=lambda r: -r.log_evidence)
+        listener("other priors", 0.0)
+        widened = np.array(list(pool.map(_widen, ranked[:CONFUSED])))
         listener("holding out", 0.0)
         held = list(pool.map(_hold_out, ranked[:HELD_OUT]))
         listener("confusion", 0.0)
         leading = ranked[:CONFUSED]
         tasks = [(r, leading, seed, number, replicates) for number, r in enumerate(leading)]
         confusion = np.array(list(pool.map(_confuse, tasks)))
-    return Selection(_table(ranked, held), confusion, replicates)
+    return Selection(
+        models=_table(ranked, held),
+        confusion=confusion,
+        replicates=replicates,
+        sensitivity=prior_sensitivity(widened),
+        disagreement=max(abs(w.quadrature - w.bridge.value) for w in weighed),
+    )
 
 
 _PROBLEM: Problem | None = None
@@ -155,6 +186,33 @@ def _rank(simulation: Simulation, problem: Problem | None = None) -> _Ranked | N
         return None
     terms = [f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits]
     return _Ranked(simulation, fits, float(np.logaddexp.reduce(terms)))
+
+
+def _integrate(ranked: _Ranked, near: float) -> _Ranked:
+    if ranked.log_evidence < near:
+        return ranked
+    problem = _held()
+    blueprint = _blueprint(problem, ranked.simulation)
+    return replace(ranked, log_evidence=log_evidence_by_quadrature(problem, blueprint, ranked.fits))
+
+
+def _weigh(ranked: _Ranked, seed: int) -> Weighed:
+    problem = _held()
+    return weigh(problem, _blueprint(problem, ranked.simulation), ranked.fits, seed)
+
+
+def _bridged(ranked: _Ranked, weighed: Weighed) -> _Ranked:
+    """The bridge's figure with its error, where it is to be believed."""
+    if not weighed.bridge.reliable:
+        return ranked
+    return replace(ranked, log_evidence=weighed.bridge.value, error=weighed.bridge.error)
+
+
+def _widen(ranked: _Ranked) -> list[float]:
+    """Log evidence for each of WIDTHS."""
+    problem = _held()
+    blueprint = _blueprint(problem, ranked.simulation)
+    return [log_evidence_by_quadrature(problem, blueprint, ranked.fits, w) for w in WIDTHS.values()]
 
 
 def _hold_out(ranked: _Ranked) -> tuple[float, float, float]:
@@ -210,9 +268,8 @@ def _table(ranked: list[_Ranked], held: list[tuple[float, float, float]]) -> pd.
         rmse, elpd, error = held[number] if number < len(held) else blank
         effects = " ".join(s.effects)
         count = len(r.best.u) + len(r.best.eta)
-        # Laplace's evidence has no Monte Carlo error to state.
         rows.append(
-            [s.kinematics, s.strain, s.order, s.law, s.friction, effects, count, r.log_evidence, float("nan"),
+            [s.kinematics, s.strain, s.order, s.law, s.friction, effects, count, r.log_evidence, r.error,
              share, rmse, elpd, error]
         )  # fmt: skip
     return pd.DataFrame(rows, columns=COLUMNS)

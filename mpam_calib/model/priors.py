@@ -34,6 +34,9 @@ class Prior(Protocol):
     def describe(self, factor: float = 1.0) -> str:
         """One phrase, with values divided by ``factor`` (the SI size of the printed unit)."""
 
+    def widened(self, factor: float) -> Prior:
+        """The same prior, ``factor`` times as wide (below 1: narrower); physical bounds stay."""
+
 
 @dataclass(frozen=True)
 class Normal:
@@ -58,6 +61,10 @@ class Normal:
     def describe(self, factor: float = 1.0) -> str:
         """One phrase."""
         return f"normal({self.mean / factor:.4g}, sd {self.scale / factor:.4g})"
+
+    def widened(self, factor: float) -> Normal:
+        """The same mean."""
+        return Normal(self.mean, factor * self.scale)
 
 
 @dataclass(frozen=True)
@@ -98,6 +105,10 @@ class NormalWithin:
         bounds = f"between {self.low / factor:.4g} and {self.high / factor:.4g}"
         return f"normal({self.mean / factor:.4g}, sd {self.scale / factor:.4g}) {bounds}"
 
+    def widened(self, factor: float) -> NormalWithin:
+        """The same mean and bounds."""
+        return NormalWithin(self.mean, factor * self.scale, self.low, self.high)
+
 
 @dataclass(frozen=True)
 class LogNormal:
@@ -124,6 +135,10 @@ class LogNormal:
         """One phrase."""
         return f"log-normal(median {self.median / factor:.4g}, factor e^±{self.log_sd:.3g})"
 
+    def widened(self, factor: float) -> LogNormal:
+        """The same median."""
+        return LogNormal(self.median, factor * self.log_sd)
+
 
 @dataclass(frozen=True)
 class HalfNormal:
@@ -147,6 +162,10 @@ class HalfNormal:
     def describe(self, factor: float = 1.0) -> str:
         """One phrase."""
         return f"half-normal(scale {self.scale / factor:.4g})"
+
+    def widened(self, factor: float) -> HalfNormal:
+        """Zero stays the bound."""
+        return HalfNormal(factor * self.scale)
 
 
 @dataclass(frozen=True)
@@ -172,6 +191,10 @@ class Uniform:
     def describe(self, factor: float = 1.0) -> str:
         """One phrase."""
         return f"uniform({self.low / factor:.4g} … {self.high / factor:.4g})"
+
+    def widened(self, factor: float) -> Uniform:
+        """The lower bound stays."""
+        return Uniform(self.low, self.low + factor * (self.high - self.low))
 
 
 @dataclass(frozen=True)
@@ -203,6 +226,11 @@ class LogUniform:
     def describe(self, factor: float = 1.0) -> str:
         """One phrase."""
         return f"log-uniform({self.low / factor:.4g} … {self.high / factor:.4g})"
+
+    def widened(self, factor: float) -> LogUniform:
+        """The same middle on the logarithmic scale."""
+        middle, reach = np.sqrt(self.low * self.high), np.sqrt(self.high / self.low) ** factor
+        return LogUniform(float(middle / reach), float(middle * reach))
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,13 @@ LOOSEST = 0.2
 """Smallest precision that is believed; the prior's own is 1."""
 
 
+class Density(Protocol):
+    """A log posterior density in sampler coordinates; not normalised: its integral is the evidence."""
+
+    def log_posterior(self, u: Array) -> Array:
+        """Log density (B,) at points (B, d)."""
+
+
 @dataclass(frozen=True)
 class Mode:
     """A local maximum: sampler coordinates (d,), log posterior there, covariance (d, d)."""
@@ -35,18 +43,18 @@ class Mode:
 
     @property
     def log_evidence(self) -> float:
-        """Laplace's approximation of the log evidence."""
+        """Laplace's approximation of the log evidence; :mod:`mpam_calib.posterior.evidence` integrates."""
         _, log_det = np.linalg.slogdet(self.covariance)
         return float(self.log_posterior + 0.5 * len(self.u) * np.log(2.0 * np.pi) + 0.5 * log_det)
 
 
-def evaluate(target: Collapsed, u: Array) -> Array:
+def evaluate(target: Density, u: Array) -> Array:
     """Log posterior (n,) in batches."""
     parts = [target.log_posterior(u[i : i + BATCH]) for i in range(0, len(u), BATCH)]
     return np.concatenate(parts)
 
 
-def climb(target: Collapsed, start: Array, steps: int = 200) -> tuple[Array, float]:
+def climb(target: Density, start: Array, steps: int = 200) -> tuple[Array, float]:
     """BFGS from a start (d,): the point reached and its log posterior."""
     d = len(start)
     offsets = np.concatenate([np.zeros((1, d)), np.eye(d), -np.eye(d)]) * GRADIENT_STEP
@@ -63,7 +71,7 @@ def climb(target: Collapsed, start: Array, steps: int = 200) -> tuple[Array, flo
     return np.asarray(found.x), -float(found.fun)
 
 
-def curvature(target: Collapsed, u: Array, top: float) -> Array:
+def curvature(target: Density, u: Array, top: float) -> Array:
     """Covariance (d, d) from the Hessian at a mode, with steps of about half a standard deviation."""
     d = len(u)
     step = np.full(d, 1e-3)

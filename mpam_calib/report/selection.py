@@ -43,13 +43,23 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
     confusion.insert(0, "simulated from", [f"{i + 1}: {name}" for i, name in enumerate(names)])
     formats = {str(i + 1): "{:.2f}" for i in range(len(names))}
     ranks = {
-        "log_evidence": "{:.1f}", "probability": "{:.3g}", "rmse_held_out_N": "{:.3g}",
+        "log_evidence": "{:.2f}", "log_evidence_se": "{:.2g}", "probability": "{:.3g}",
+        "rmse_held_out_N": "{:.3g}",
         "elpd_held_out": "{:.1f}", "elpd_held_out_se": "{:.1f}",
     }  # fmt: skip
     sections = [
         Section(
-            "Ranking", [DataTable(models.drop(columns="log_evidence_se").head(SHOWN), "Best first", ranks)]
+            "Ranking",
+            [
+                DataTable(models.head(SHOWN), "Best first", ranks),
+                Text(
+                    "Evidence of the leading models is by bridge sampling, with its error; quadrature "
+                    f"differs from it by at most {found.disagreement:.2g} nats. Models far below have "
+                    "Laplace's approximation."
+                ),
+            ],
         ),
+        _sensitivity_section(found, names),
         Section(
             "Would data like these tell them apart?",
             [
@@ -62,3 +72,28 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
         ),
     ]
     return Page(specimen.name, "Model selection", lead, sections)
+
+
+def _sensitivity_section(found: Selection, names: list[str]) -> Section:
+    """Shares among the leading models under other prior widths."""
+    shares = found.sensitivity.pivot_table(index="model", columns="prior", values="probability")
+    shares = shares[list(dict.fromkeys(found.sensitivity["prior"]))].reset_index(drop=True)
+    winners = sorted({names[int(i)] for i in shares.to_numpy().argmax(axis=0)})
+    said = (
+        "The first model stays first under all of them."
+        if len(winners) == 1
+        else f"Which model is first depends on them: {'; '.join(winners)}."
+    )
+    formats = dict.fromkeys(shares.columns, "{:.3g}")
+    shares.insert(0, "probability among these", [f"{i + 1}: {name}" for i, name in enumerate(names)])
+    return Section(
+        "Does it depend on the priors?",
+        [
+            Text(
+                "Evidence weighs a model by what its prior thought possible. Here the widths of the priors "
+                "are halved and doubled: of the moduli (stated in newtons), and of all other parameters. "
+                + said
+            ),
+            DataTable(shares, "Shares among the leading models", formats),
+        ],
+    )

@@ -1,4 +1,4 @@
-"""``select`` from a specimen folder to a RUN folder: models.csv, report.html."""
+"""``select`` from a specimen folder to a RUN folder: models.csv, prior_sensitivity.csv, report.html."""
 
 from __future__ import annotations
 
@@ -28,5 +28,6 @@ def select_to_folder(
     material = resolve_material(specimen)
     found = select(specimen, seed=seed, replicates=replicates, material=material, tell=tell)
     write_csv(found.models, run / "models.csv")
+    write_csv(found.sensitivity, run / "prior_sensitivity.csv")
     selection_page(found, specimen).write(run / "report.html")
     return found

@@ -24,6 +24,11 @@ def test_the_simulated_model_comes_first(monkeypatch: pytest.MonkeyPatch) -> Non
     assert models["probability"].sum() == pytest.approx(1.0)
     assert found.confusion.shape == (2, 2)
     np.testing.assert_allclose(found.confusion.sum(axis=1), 1.0)
+    # The leading models have an error of their evidence, and figures under other priors; no other has.
+    assert models["log_evidence_se"].notna().tolist() == [True] * 2 + [False] * (len(models) - 2)
+    assert models["log_evidence_se"].iloc[:2].between(0.0, 0.1).all()
+    assert len(found.sensitivity) == 2 * 5
+    assert found.disagreement < 0.2
     best = models.iloc[0]
     for name in ("kinematics", "strain", "order", "law", "friction"):
         assert best[name] == getattr(recipe, name), name

@@ -86,3 +86,23 @@ def test_every_parameter_of_a_full_model_goes_there_and_back():
     assert len(set(model.names)) == len(model.names)
     u = np.random.default_rng(0).standard_normal((50, len(model.names)))
     assert model.coordinates(model.values(u)) == pytest.approx(u, abs=1e-7)
+
+
+def test_widened_priors():
+    """Sds, or logarithmic sds, by the factor; bounds that physics sets stay where they are."""
+    for factor in (0.5, 2.0):
+        assert Normal(3.0, 2.0).widened(factor) == Normal(3.0, factor * 2.0)
+        assert LogNormal(0.2, 0.7).widened(factor) == LogNormal(0.2, factor * 0.7)
+        assert HalfNormal(0.2).widened(factor).sd == pytest.approx(factor * HalfNormal(0.2).sd)
+        assert Uniform(-1.0, 4.0).widened(factor) == Uniform(-1.0, -1.0 + factor * 5.0)
+        within = NormalWithin(0.5, 2.0, -0.5, np.inf).widened(factor)
+        assert within == NormalWithin(0.5, factor * 2.0, -0.5, np.inf)
+        span = LogUniform(0.01, 3.0).widened(factor)
+        assert np.log(span.high / span.low) == pytest.approx(factor * np.log(300.0))
+        assert span.low * span.high == pytest.approx(0.03)
+
+
+@cases
+def test_a_factor_of_one_changes_nothing(prior, named):
+    u = np.linspace(-3.0, 3.0, 13)
+    assert prior.widened(1.0).from_normal(u) == pytest.approx(prior.from_normal(u), rel=1e-12)
