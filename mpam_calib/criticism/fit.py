@@ -89,20 +89,22 @@ def fit(
     names = tuple(p.name for p in chain.parameters)
     d, p, n = len(names), chain.linear_size, len(problem)
     axes, spread = problem.axes[0], problem.spreads[size][:, None]
+    readings, first, second = problem.lean
     still = SETTLED * problem.noise_level.total
 
     def terms(u: Array, guide: Array) -> tuple[Array, Array]:
         values = {q.name: q.prior.from_normal(u[:, i : i + 1]) for i, q in enumerate(chain.parameters)}
         if not values:
             values = {"": np.zeros((len(u), 1))}
-        got = chain.terms(values, problem.readings, guide)
-        fixed = np.broadcast_to(got.fixed, (len(u), 2 * n))
-        columns = np.broadcast_to(got.columns, (len(u), 2 * n, p))
+        got = chain.terms(values, readings, guide)
+        fixed = np.broadcast_to(got.fixed, (len(u), len(readings)))
+        columns = np.broadcast_to(got.columns, (len(u), len(readings), p))
         return fixed, columns
 
     u: Array = np.array([(start or {}).get(name, 0.0) for name in names], dtype=np.float64)
     eta: Array = np.zeros(p)
-    guide = np.concatenate([problem.force, problem.force])
+    guide = np.empty(len(readings))
+    guide[:n], guide[first], guide[second] = problem.force, problem.force, problem.force
     best: tuple[float, Array, Array, Array, Array, Array] | None = None
     damping = 1e-3
     bends = np.array([BENDS in name for name in names], dtype=bool)
@@ -110,7 +112,7 @@ def fit(
     released = not bends.any() or bool(np.any(u[bends] != 0.0))
     offsets = np.concatenate([np.zeros((1, d)), STEP * np.eye(d)])
     nudge = NUDGE * problem.force_scale
-    for turn in range(ROUNDS):
+    for _turn in range(ROUNDS):
         if chain.uses_force:
             fixed, columns = terms(u + np.concatenate([offsets, offsets[:1]]), _nudged(guide, d + 2, nudge))
             # A force that depends on itself, F = f(F): one Newton step of its fixed point, for all at once.
@@ -121,8 +123,8 @@ def fit(
         else:
             fixed, columns = terms(u + offsets, guide)
         whole, whole_columns = fixed[0], columns[0]
-        fixed = 0.5 * (fixed[:, :n] + fixed[:, n:])
-        columns = 0.5 * (columns[:, :n] + columns[:, n:])
+        fixed = 0.5 * (fixed[:, first] + fixed[:, second])
+        columns = 0.5 * (columns[:, first] + columns[:, second])
         white = (axes @ np.column_stack([problem.force - fixed[0], columns[0]])) / spread
         residual, X = white[:, 0], white[:, 1:]
         # Given the sizes, the moduli's optimum is exact.
@@ -174,7 +176,7 @@ def fit(
 
 
 def _nudged(guide: Array, copies: int, nudge: float) -> Array:
-    """The guide (2n,) for every row of a batch (copies, 2n), the last one moved."""
+    """The guide (m,) for every row of a batch (copies, m), the last one moved."""
     rows = np.repeat(guide[None, :], copies, axis=0)
     rows[-1] += nudge
     return rows

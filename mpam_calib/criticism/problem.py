@@ -19,7 +19,7 @@ from mpam_calib.criticism.noise_level import NoiseLevel, noise_level
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.readings import Readings
-from mpam_calib.posterior.bins import bin_loops
+from mpam_calib.posterior.bins import LoopBins, bin_loops
 from mpam_calib.posterior.covariance import StrokeCovariance
 from mpam_calib.posterior.points import gather_points
 from mpam_calib.specimen.recording import Specimen
@@ -27,7 +27,7 @@ from mpam_calib.specimen.recording import Specimen
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-ROWS = 640
+ROWS = 480
 """About so many reduced rows; the covariance is dense."""
 HALF_WAVES = 24
 SIZES = (0.0, 0.002, 0.008, 0.03)
@@ -37,6 +37,10 @@ STROKE_SHARE = 0.35
 """Size of each stroke's own part of the remainder, as a share of the common part."""
 PRESSURE_LENGTH = 0.08
 """Distance in pressure (share of the top level) over which the remainder changes."""
+LONG, FAST_SHARE = 0.04, 0.3
+"""A row longer than this share of the stroke, or of its way since the turn, is looked at in two places."""
+ALIKE = 0.9
+"""How alike the rests of two strokes are."""
 FORCE_MAP_NOISE = 0.003
 """Noise of a static reading as a share of the force scale, where no sensor sd is declared."""
 
@@ -83,6 +87,24 @@ class Problem:
             displacement=0.5 * (low.displacement + high.displacement),
             travel=0.5 * (low.travel + high.travel),
         )
+
+    @cached_property
+    def lean(self) -> tuple[Readings, Ints, Ints]:
+        """The readings (m,) that a fit needs, and the two (n,) whose mean each row is.
+
+        A row's middle is enough where the row is short, and not next to a turn, where the friction changes.
+        """
+        n = len(self)
+        x, travel = self.readings.displacement, self.readings.travel
+        width = np.abs(x[n:] - x[:n])
+        assert self.model.setting is not None
+        long = width > LONG * self.model.setting.stroke
+        fast = np.flatnonzero(long | (width > FAST_SHARE * np.minimum(travel[n:], travel[:n])))
+        readings = Readings.join([self.middle(), self.readings.take(fast), self.readings.take(fast + n)])
+        first, second = np.arange(n), np.arange(n)
+        first[fast] = n + np.arange(len(fast))
+        second[fast] = n + len(fast) + np.arange(len(fast))
+        return readings, first, second
 
     def take(self, rows: NDArray[np.bool_]) -> Problem:
         """The problem on some of its rows (a fold)."""
@@ -146,11 +168,11 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         layout = StrokeCovariance.build(bins)
         white, correlated, time = (np.array([v]) for v in (noise.white, noise.correlated, noise.time))
         padded = layout.matrix(white, correlated, time, np.zeros(1))[0][layout.kind]
-        full = np.zeros((len(bins), len(bins)))
+        full = _held(bins)
         for segment in range(bins.segments):
             rows = np.flatnonzero(bins.segment == segment)
             at = bins.position[rows]
-            full[np.ix_(rows, rows)] = padded[segment][np.ix_(at, at)]
+            full[np.ix_(rows, rows)] += padded[segment][np.ix_(at, at)]
         keep = np.flatnonzero(~bins.slack)
         n = len(bins)
         low, high = bins.readings.take(keep), bins.readings.take(keep + n)
@@ -184,6 +206,28 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         has_clock=specimen.loops is not None,
     )
     return replace(problem, kernel=_kernel(problem))
+
+
+def _held(bins: LoopBins) -> Array:
+    """What bins at rest may be off by (covariance, N²): their level's friction, much the same in all strokes.
+
+    Where the crosshead stops for a while, friction holds, fades or creeps; no model of sliding knows which.
+    """
+    n = len(bins)
+    x, force, sign = bins.middle().displacement, bins.force, bins.readings.sign[:n]
+    doubt = np.zeros(n)
+    for level in np.unique(bins.readings.level[:n]):
+        here = bins.readings.level[:n] == level
+        up, down = (np.flatnonzero(here & (bins.rest < 0.5) & (sign == s)) for s in (1.0, -1.0))
+        if len(up) < 3 or len(down) < 3:
+            continue
+        down = down[np.argsort(x[down])]
+        half = 0.5 * (force[up] - np.interp(x[up], x[down], force[down]))
+        friction = np.polynomial.Polynomial.fit(x[up], half, 1)(x)
+        doubt[here] = (sign * friction * bins.rest)[here]
+    alike = np.where(bins.segment[:, None] == bins.segment, 1.0, ALIKE)
+    result: Array = doubt[:, None] * doubt * alike * (sign[:, None] == sign)
+    return result
 
 
 def _from_differences(force: Array, segment: Ints) -> float:

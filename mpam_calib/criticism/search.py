@@ -30,6 +30,8 @@ WIDTH = 6
 PARTNERS = 8
 """Best single effects that are tried as partners of every kept set."""
 LARGEST = 3
+LEADERS = 5
+"""Sets whose parts and forms are looked at once more."""
 STARTS = (0.8, -0.8)
 """Further starts (prior sds) for a single effect: the force is curved in some of them."""
 
@@ -41,6 +43,9 @@ class Search:
     problem: Problem
     tested: tuple[str, ...]
     fits: dict[tuple[Set, int], Fit] = field(default_factory=dict)
+    kind: dict[str, str] = field(default_factory=dict)
+    """The flexible form in which each effect did best alone."""
+    polished: set[tuple[Set, int]] = field(default_factory=set)
 
     def refit(self, effects: Set, size: int, starts: Iterable[dict[str, float]] = ({},)) -> Fit:
         """The best exact refit of a set: over its effects' forms and from some starts.
@@ -51,17 +56,25 @@ class Search:
         key = (effects, size)
         if key in self.fits:
             return self.fits[key]
-        choice = {e: flexible(e) for e in effects}
+        choices = [{e: self.kind.get(e, flexible(e)[0]) for e in effects}]
+        if len(effects) == 1:
+            choices = [{e: form} for e in effects for form in flexible(e)]
         best: Fit | None = None
-        for start in [*starts, *self._inherited(effects, size)]:
-            best = self._better(best, choice, size, start)
+        for choice in choices:
+            for start in self._inherited(effects, size) or starts:
+                best = self._better(best, choice, size, start)
         if best is None:
             raise np.linalg.LinAlgError(f"no fit of {sorted(effects)}")
         self.fits[key] = best
+        if len(effects) == 1 and size == self.best_size(effects):
+            self.kind.update({e.partition(":")[0]: e for e in best.effects})
         return best
 
     def polish(self, effects: Set, size: int) -> None:
         """Change one form of a set at a time, as long as that helps."""
+        if (effects, size) in self.polished:
+            return
+        self.polished.add((effects, size))
         best: Fit | None = self.fits[effects, size]
         for e in sorted(effects):
             for form in forms_of(e):
@@ -83,8 +96,15 @@ class Search:
         return found if best is None or found.log_evidence > best.log_evidence else best
 
     def _inherited(self, effects: Set, size: int) -> list[dict[str, float]]:
-        """Where the set's subsets ended: their sizes together are a good place to start."""
+        """Where the set ended beside another remainder, and where its subsets did, together."""
+        near = [
+            known for other in (size - 1, size + 1) if (known := self.fits.get((effects, other))) is not None
+        ]
+        if near and len(effects) > 1:
+            return [dict(zip(near[0].names, near[0].u.tolist(), strict=True))]
         found: dict[str, float] = {}
+        if len(effects) == 1:
+            return []
         for smaller in [
             frozenset(),
             *map(frozenset, combinations(sorted(effects), max(len(effects) - 1, 1))),
@@ -142,20 +162,30 @@ def search(
     singles = [next(iter(s)) for s in _keep(found, 1, PARTNERS)]
     for k in range(2, LARGEST + 1):
         tries = {s | {p} for s in kept for p in _partners(found, s, singles) if p not in s}
+        if k == 2:
+            # Small causes show only beside each other: all pairs are worth a look.
+            for pair in map(frozenset, combinations(tested, 2)):
+                _try(found, pair, (0,))
         for number, effects in enumerate(sorted(tries, key=sorted)):
             _try(found, effects, (0, 1))
             tell(0.3 + 0.35 * (k - 2) + 0.35 * (number + 1) / len(tries))
         kept = _keep(found, k, width)
         for effects in kept:
             _try(found, effects, range(len(SIZES)))
-            for size in {0, found.best_size(effects)}:
-                if (effects, size) in found.fits:
-                    found.polish(effects, size)
-    for effects in found.sets[:4]:
-        # A leader's own parts must have been looked at, or it could hide a passenger.
-        for smaller in combinations(sorted(effects), max(len(effects) - 1, 0)):
-            _try(found, frozenset(smaller), range(len(SIZES)))
+    for _ in range(2):
+        for effects in found.sets[:LEADERS]:
+            # A leader's own parts must have been looked at, or it could hide a passenger.
+            for smaller in map(frozenset, combinations(sorted(effects), max(len(effects) - 1, 0))):
+                _try(found, smaller, range(len(SIZES)))
+                _polish(found, smaller)
+            _polish(found, effects)
     return found
+
+
+def _polish(found: Search, effects: Set) -> None:
+    for size in {0, found.best_size(effects)}:
+        if (effects, size) in found.fits:
+            found.polish(effects, size)
 
 
 def _try(found: Search, effects: Set, sizes: Iterable[int], curved: bool = False) -> None:
@@ -170,23 +200,25 @@ def _try(found: Search, effects: Set, sizes: Iterable[int], curved: bool = False
             continue
 
 
-def flexible(identifier: str) -> str:
-    """The form that holds most shapes of an effect."""
-    return f"{identifier}:{FORM}" if effect(identifier).bends else identifier
+def flexible(identifier: str) -> tuple[str, ...]:
+    """The forms that hold most shapes of an effect, one of every kind."""
+    item = effect(identifier)
+    if not item.bends:
+        return (identifier,)
+    return (f"{identifier}:{FORM}", *(f"{identifier}:{kind}-{FORM}" for kind in item.kinds))
 
 
 @lru_cache
 def forms_of(identifier: str) -> tuple[str, ...]:
     """The effect's id as it is, and with each of its other forms."""
-    item = effect(identifier)
-    bent = (FORM,) if item.bends else ()
-    return (identifier, *(f"{identifier}:{form}" for form in (*bent, *item.forms)))
+    forms = tuple(f"{identifier}:{form}" for form in effect(identifier).forms)
+    return tuple(dict.fromkeys((identifier, *forms, *flexible(identifier))))
 
 
 def _own_names(problem: Problem, effects: Set) -> list[str]:
     setting = problem.model.setting
     assert setting is not None
-    return [p.name for e in effects for p in effect(e).parameters(setting)]
+    return [p.name for e in effects for p in effect(e).parameters(setting)[:1]]
 
 
 def _keep(found: Search, count: int, width: int) -> list[Set]:

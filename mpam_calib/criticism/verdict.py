@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from mpam_calib.criticism.budget import remainder_rms
 from mpam_calib.criticism.problem import SIZES
 from mpam_calib.criticism.search import Search, Set
 
@@ -16,7 +17,7 @@ SURE, LEAD = 0.95, 5.0
 """Probability that the named set holds, and nats by which it leads."""
 LISTED = 5
 NOISE_SIZE = 0.5
-"""A remainder below this share of a row's own noise is at the level of the noise."""
+"""A remainder whose root mean square is below this share of a reading's noise is at its level."""
 
 
 @dataclass(frozen=True)
@@ -70,9 +71,7 @@ def _structure_left(found: Search, leading: Set, size: int) -> bool:
     held = found.fits[leading, size]
     if bare is not None and held.log_evidence - bare.log_evidence < LEAD:
         return False
-    scale = SIZES[size] * found.problem.force_scale
-    noise = float(np.sqrt(np.median(np.diagonal(found.problem.noise))))
-    return scale > NOISE_SIZE * noise
+    return remainder_rms(found.problem, held) > NOISE_SIZE * found.problem.noise_level.total
 
 
 def _standing(found: Search, leading: Set) -> Set:

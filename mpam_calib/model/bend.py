@@ -2,7 +2,7 @@
 
 No rig follows an equation to the letter: a fixture stiffens, relaxation is no straight line over the
 logarithm of time. An effect declared as ``id:bent`` has its size multiplied by a smooth positive
-function of what drives it, exp(Σ c_j P_j(v)), with Legendre polynomials P_j of a driver v in about
+function of what drives it, exp(Σ c_j P_j(v)), with Legendre polynomials P_1, P_2 of a driver v in about
 −1..1 (the contraction, the pressure, the time ...) and c_j ~ N(0, (BEND/j)²). So a name survives an
 equation that is not quite the real one, and pays for the freedom in its evidence.
 """
@@ -13,12 +13,10 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from mpam_calib.model.priors import Normal, Parameter
 from mpam_calib.model.state import Setting, State
-from mpam_calib.units import MINUTE, MM
 
 Array = NDArray[np.float64]
 
@@ -26,14 +24,14 @@ FORM: Final = "bent"
 """The form's name: ``id:bent``."""
 BENDS: Final = "_bend_"
 """What the names of its coefficients hold."""
-BEND: Final = 0.3
-"""Prior sd of the first bend: a size that differs by ±30 % between the two ends of its driver."""
+BEND: Final[Mapping[str, float]] = {"contraction": 0.25, "pressure": 0.25, "force": 0.4, "speed": 0.4}
+"""Prior sd of the first bend: a size that differs by ±25 % between the two ends of its driver ..."""
+LOOSE: Final = 0.5
+"""... and for the others, whose laws are the least known: how things fade with time, cycles and travel."""
 MOST: Final = 1.5
 """Largest logarithm of the factor, whatever the coefficients."""
 TURN_SHARE: Final = 0.03
 """Share of the stroke after which a turn is half over, for the driver ``travel``."""
-SPEED: Final = 50.0 * MM / MINUTE
-"""Speed at which the driver ``speed`` is zero (the thesis's)."""
 
 
 def _pressure(state: State, setting: Setting) -> Array:
@@ -42,8 +40,8 @@ def _pressure(state: State, setting: Setting) -> Array:
 
 
 def _speed(state: State, setting: Setting) -> Array:
-    speed = np.where(state.readings.speed > 0.0, state.readings.speed, SPEED)
-    return np.asarray(np.log10(speed / SPEED))
+    speed = np.where(state.readings.speed > 0.0, state.readings.speed, setting.speed)
+    return np.asarray(np.log10(speed / setting.speed))
 
 
 def _travel(state: State, setting: Setting) -> Array:
@@ -68,13 +66,19 @@ DRIVERS: Final[Mapping[str, Callable[[State, Setting], Array]]] = {
 
 def bend_parameters(name: str, bends: Mapping[str, int], constant: bool) -> tuple[Parameter, ...]:
     """The coefficients c_j of a size called ``name``; with a constant one where the size itself is none."""
-    found = [Parameter(f"{name}{BENDS}0", Normal(0.0, BEND), "logarithm of the size", "", "")] if constant else []
+    found = (
+        [Parameter(f"{name}{BENDS}0", Normal(0.0, LOOSE), "logarithm of the size", "", "")]
+        if constant
+        else []
+    )
     number = 0
     for driver, degree in bends.items():
         for j in range(1, degree + 1):
             number += 1
             meaning = f"bend of the shape along {driver.replace('_', ' ')}, degree {j}"
-            found.append(Parameter(f"{name}{BENDS}{number}", Normal(0.0, BEND / j), meaning, "", ""))
+            found.append(
+                Parameter(f"{name}{BENDS}{number}", Normal(0.0, BEND.get(driver, LOOSE) / j), meaning, "", "")
+            )
     return tuple(found)
 
 
@@ -88,5 +92,5 @@ def bend_factor(
         v = np.clip(DRIVERS[driver](state, setting), -1.5, 1.5)
         for j in range(1, degree + 1):
             number += 1
-            log = log + values[f"{name}{BENDS}{number}"] * legendre.legval(v, [0.0] * j + [1.0])
+            log = log + values[f"{name}{BENDS}{number}"] * (v if j == 1 else 1.5 * v**2 - 0.5)
     return np.exp(np.clip(log, -MOST, MOST))

@@ -15,9 +15,12 @@ from mpam_calib.model.reference import force_scale, geometric_contraction
 from mpam_calib.model.state import Setting
 from mpam_calib.specimen.declaration import Braid, Geometry, Sensors, Simulation
 from mpam_calib.specimen.recording import Loops, Specimen
+from mpam_calib.units import MINUTE, MM
 
 Array = NDArray[np.float64]
 
+STILL_SHARE = 0.01
+"""A stroke shorter than this share of the longest is a hold."""
 PULL_SHARE = 0.02
 """A muscle that shows this share of its greatest force pulls."""
 
@@ -51,7 +54,8 @@ class Blueprint(Value):
     ``stroke`` (m) is the largest recorded displacement, ``reach`` the largest contraction at each
     level, ``pulls_at`` (Pa) the lowest pressure with a clear pull, ``stroke_time`` (s) the median
     duration of a stroke (None without loops) ``reading_time`` (s) that between two readings,
-    ``duration`` (s) that of the whole test and ``level_time`` (s) the longest at one level.
+    ``duration`` (s) that of the whole test, ``level_time`` (s) the longest at one level and ``speed`` (m/s)
+    the geometric mean of the strokes' speeds.
     """
 
     simulation: Simulation
@@ -66,6 +70,7 @@ class Blueprint(Value):
     reading_time: float
     duration: float = 0.0
     level_time: float = 0.0
+    speed: float = 50.0 * MM / MINUTE
     branches: bool
     free_contraction: bool
     tensile_range: tuple[float, float] | None
@@ -90,6 +95,7 @@ class Blueprint(Value):
             pulls_at=self.pulls_at,
             duration=self.duration,
             level_time=self.level_time,
+            speed=self.speed,
         )
 
 
@@ -118,6 +124,7 @@ def draw_blueprint(
         reading_time=0.0 if loops is None else max(float(np.median(np.diff(loops.time_s))), 1e-6),
         duration=0.0 if loops is None else float(loops.time_s.max()),
         level_time=0.0 if loops is None else _level_time(loops),
+        speed=50.0 * MM / MINUTE if loops is None else _speed(loops),
         branches=any(p is not None and bool(np.any(np.abs(p.branch) == 1)) for p in parts),
         free_contraction=specimen.free_contraction is not None,
         tensile_range=_tensile_range(specimen),
@@ -170,6 +177,17 @@ def _stroke_time(loops: Loops) -> float:
     starts = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
     ends = np.append(starts[1:], len(loops.stroke)) - 1
     return float(np.median(np.maximum(loops.time_s[ends] - loops.time_s[starts], 1e-3)))
+
+
+def _speed(loops: Loops) -> float:
+    """Geometric mean of the speeds of the strokes that move, m/s; the thesis's where none does."""
+    strokes = pd.DataFrame({"x": loops.displacement_m, "t": loops.time_s}).groupby(loops.stroke)
+    travel = (strokes["x"].max() - strokes["x"].min()).to_numpy()
+    time = np.maximum((strokes["t"].max() - strokes["t"].min()).to_numpy(), 1e-9)
+    moving = travel > STILL_SHARE * travel.max(initial=0.0)
+    return (
+        float(np.exp(np.mean(np.log(travel[moving] / time[moving])))) if moving.any() else 50.0 * MM / MINUTE
+    )
 
 
 def _level_time(loops: Loops) -> float:

@@ -45,7 +45,8 @@ class Effect:
     needs the muscle's own force (a fixture that gives way), which the chain then finds by fixed
     point. ``needs_braid`` is set where it needs the declared strands. ``bends`` names the drivers (and
     degrees) along which its first parameter may vary in the form ``id:bent``
-    (:mod:`mpam_calib.model.bend`); an effect without parameters then reads its size under its own id.
+    (:mod:`mpam_calib.model.bend`), and ``kinds`` those of its forms that differ from it in kind and may bend
+    too (``id:form-bent``); an effect without parameters then reads its size under its own id.
     """
 
     id: str
@@ -59,6 +60,7 @@ class Effect:
     uses_force: bool = False
     needs_braid: bool = False
     bends: Mapping[str, int] = field(default_factory=dict)
+    kinds: tuple[str, ...] = ()
 
 
 _REGISTRY: dict[str, Effect] = {}
@@ -78,9 +80,12 @@ def effect(identifier: str) -> Effect:
     _load_catalogue()
     base, _, form = identifier.partition(":")
     found = _REGISTRY[base]
-    if form == FORM and found.bends:
-        return _bent(found)
-    return replace(found, id=identifier, apply=found.forms[form]) if form else found
+    if not form:
+        return found
+    plain = form.removesuffix(FORM).removesuffix("-")
+    if plain:
+        found = replace(found, apply=found.forms[plain])
+    return replace(found if plain == form else _bent(found), id=identifier)
 
 
 def _bent(item: Effect) -> Effect:
@@ -98,7 +103,7 @@ def _bent(item: Effect) -> Effect:
         factor = bend_factor(name, item.bends, values, state, setting)
         return item.apply(state, {**values, name: size * factor}, setting)
 
-    return replace(item, id=f"{item.id}:{FORM}", parameters=parameters, apply=apply)
+    return replace(item, parameters=parameters, apply=apply)
 
 
 def known_effects() -> tuple[str, ...]:

@@ -28,17 +28,11 @@ EFFECT_IDS: Final[tuple[str, ...]] = (
 """Ids of the effects that ship with the package."""
 
 EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
-    **{identifier: ("bent",) for identifier in EFFECT_IDS},
+    **dict.fromkeys(EFFECT_IDS, ("bent",)),
     "dead_band": ("bent", "soft"),
-    "tip_shape": ("bent", "implicit"),
-    "strand_friction": ("bent", "proportional"),
-    "rate_friction": ("bent", "linear", "power"),
-    "presliding": ("bent", "rest", "tanh", "slow"),
-    "stress_softening": ("bent", "force", "power", "stretched"),
-    "creep": ("bent", "power", "settling"),
-    "force_drift": ("bent", "settling", "square"),
-    "pressure_droop": ("bent", "square"),
-    "rig_compliance": ("bent", "stiffening"),
+    "presliding": ("bent", "rest", "rest-bent"),
+    "stress_softening": ("bent", "force", "force-bent"),
+    "law_shape": (),
 }
 """Other forms of the effects, declared as ``id:form``."""
 

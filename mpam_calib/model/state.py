@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mpam_calib.model.readings import Readings
 from mpam_calib.physics.kinematics import Rest, Shape
 from mpam_calib.specimen.declaration import Braid, Geometry, Simulation
+from mpam_calib.units import MINUTE, MM
 
 Array = NDArray[np.float64]
 
@@ -39,6 +40,8 @@ class Setting:
     """Length of the whole test, s."""
     level_time: float = 0.0
     """Longest time spent at one level, s."""
+    speed: float = 50.0 * MM / MINUTE
+    """Geometric mean of the strokes' speeds, m/s; without loops the thesis's."""
 
     @property
     def top_pressure(self) -> float:
@@ -51,7 +54,8 @@ class State:
     """Arrays of shape (B, n) or broadcastable to it: B parameter vectors, n readings.
 
     rig: ``pressure`` (Pa) and ``displacement`` (m) that the muscle really sees.
-    shape: ``rest``, ``kinematics``, ``swell`` (factor on the radius's growth), the working ``length`` (m) and, once solved, the ``shape``.
+    shape: ``rest``, ``kinematics``, ``swell`` (factor on the radius's growth), the working ``length`` (m)
+    and, once solved, the ``shape``.
     statics: ``wall_factor`` on the thickness term, ``lost`` (N) to be subtracted.
     friction: ``sign`` s (fractions while it turns over), ``coulomb`` K and ``strand`` f_s.
     history: ``wall_gain`` on the bladder's stress and ``gain`` on the whole force.

@@ -51,8 +51,12 @@ def modulus_columns(shape: Shape, rest: Rest, convention: str, order: int) -> Ar
     times the moduli.
     """
     z, x = strains(shape, rest, convention)
-    axial, hoop = axial_lever(shape), hoop_lever(shape)
-    return np.stack([axial * z**k - hoop * x**k for k in range(1, order + 1)], axis=-1)
+    axial, hoop = axial_lever(shape) * z, hoop_lever(shape) * x
+    columns = [axial - hoop]
+    for _ in range(order - 1):
+        axial, hoop = axial * z, hoop * x
+        columns.append(axial - hoop)
+    return np.stack(columns, axis=-1)
 
 
 def braid_energy_force(P: Array, L: Array, rest: Rest, E_br: float, R_br: float, n: int) -> Array:

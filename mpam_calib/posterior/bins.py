@@ -26,8 +26,8 @@ UNREDUCED = 16
 """Strokes of up to so many readings are left as they are."""
 CHUNK = 32
 """At most so many consecutive readings of a bin tell of the fast noise."""
-AT_REST = 0.05
-"""Below this share of its stroke's mean speed the crosshead rests."""
+AT_REST = 0.1
+"""Up to this share of its stroke's mean speed the crosshead is at rest."""
 SLACK_SHARE = 0.2
 """A bin with this share of its readings at or below the floor says "slack", not a value."""
 
@@ -39,7 +39,8 @@ class LoopBins:
     ``readings`` holds the 2n Gauss points (all lower ones, then all upper ones); ``force`` the mean
     reading (N); ``count`` its number of rows; ``segment`` and ``position`` place a bin in the padded
     (segments, width) layout; ``start``, ``stop`` (s) are its first and last row's times and ``dt``
-    (segments,) the time between rows; ``slack`` marks bins at the floor. ``scatter`` is
+    (segments,) the time between rows; ``slack`` marks bins at the floor, ``rest`` is the share of a bin's
+    rows at rest. ``scatter`` is
     (Σ c cᵀ over chunks, their number, the contrast matrix Q, dt) of the detrended fast residuals, or None.
     """
 
@@ -52,6 +53,7 @@ class LoopBins:
     stop: Array
     dt: Array
     slack: NDArray[np.bool_]
+    rest: Array
     contraction_scale: float
     scatter: tuple[Array, int, Array, float] | None
     averaged: int
@@ -106,7 +108,16 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
     row_bin = np.repeat(np.arange(len(starts)), stops - starts)
     spread = np.sqrt(mean((loops.displacement_m - displacement[row_bin]) ** 2))
     direction = np.where(loops.branch[starts] == -1, 1.0, -1.0)
-    travel, reversal, speed, at_level = _history(loops, stroke_starts, lengths)
+    travel, reversal, at_level = _history(loops, stroke_starts, lengths)
+    speed, rest = _speed(
+        loops, stroke_starts, stroke_starts + lengths - 1, np.repeat(np.arange(len(lengths)), lengths)
+    )
+    # A bin that comes to rest has the speed of its moving part.
+    weight = np.where(rest, 1e-9, 1.0)
+
+    def moving_mean(x: Array) -> Array:
+        return np.asarray(np.add.reduceat(weight * x, starts) / np.add.reduceat(weight, starts))
+
     bin_travel = mean(travel)
     force = mean(loops.force_N)
     common = {
@@ -117,7 +128,7 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
         "time_at_level": mean(at_level),
         "cycle": loops.cycle[starts].astype(np.float64),
         "reversal": reversal[segment],
-        "speed": mean(speed),
+        "speed": np.exp(moving_mean(np.log(np.maximum(speed, 1e-12)))),
     }
     halves = [
         Readings(
@@ -144,6 +155,7 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
             segment,
             2 * loops.level[starts] + (direction > 0),
         ),
+        rest=mean(rest.astype(np.float64)),
         contraction_scale=float(np.ptp(displacement)) or 1.0,
         scatter=_scatter(loops, starts, stops, segment, position, dt),
         averaged=loops.averaged,
@@ -175,7 +187,7 @@ def row_readings(loops: Loops) -> Readings:
     first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
     lengths = np.diff(np.append(first, len(loops.stroke)))
     segment = np.repeat(np.arange(len(first)), lengths)
-    travel, reversal, speed, at_level = _history(loops, first, lengths)
+    travel, reversal, at_level = _history(loops, first, lengths)
     return Readings(
         pressure=loops.pressure_Pa,
         displacement=loops.displacement_m,
@@ -186,12 +198,12 @@ def row_readings(loops: Loops) -> Readings:
         cycle=loops.cycle.astype(np.float64),
         travel=travel,
         reversal=reversal[segment],
-        speed=speed,
+        speed=_speed(loops, first, first + lengths - 1, segment)[0],
     )
 
 
-def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array, Array]:
-    """Travel since the turn (rows), whether a reversal began the stroke, speed (rows), time at the level."""
+def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array]:
+    """Travel since the turn (rows), whether a reversal began the stroke, time at the level (rows)."""
     segment = np.repeat(np.arange(len(first)), lengths)
     same_level = np.zeros(len(first), dtype=bool)
     same_level[1:] = (loops.level[first][1:] == loops.level[first][:-1]) & (
@@ -214,23 +226,24 @@ def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Ar
     run = np.cumsum(~same_level) - 1
     level_start = loops.time_s[first][~same_level]
     at_level = loops.time_s - level_start[run][segment]
-    return travel, (same_level & opposite).astype(np.float64), _speed(loops, first, last, segment), at_level
+    return travel, (same_level & opposite).astype(np.float64), at_level
 
 
-def _speed(loops: Loops, first: Ints, last: Ints, segment: Ints) -> Array:
-    """Speed at every row (m/s), over a fortieth of the stroke to either side; at rest, that of the stroke."""
+def _speed(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array, NDArray[np.bool_]]:
+    """Speed at every row (m/s), over a fortieth of the stroke to either side, and whether it is at rest.
+
+    At rest the speed is the one that the stroke otherwise has: friction does not vanish with the motion.
+    """
     rows = np.arange(len(segment))
     window = np.maximum((last - first + 1) // 40, 1)[segment]
     before, after = np.maximum(rows - window, first[segment]), np.minimum(rows + window, last[segment])
     elapsed = np.maximum(loops.time_s[after] - loops.time_s[before], 1e-9)
     local = np.abs(loops.displacement_m[after] - loops.displacement_m[before]) / elapsed
     mean = np.add.reduceat(local, first) / (last - first + 1)
-    moving = local >= AT_REST * mean[segment]
-    # A friction that depends on speed does not vanish where the crosshead stops for a while.
-    typical = np.add.reduceat(np.where(moving, local, 0.0), first) / np.maximum(
-        np.add.reduceat(moving.astype(np.float64), first), 1.0
-    )
-    return np.where(moving, local, typical[segment])
+    rest = local <= AT_REST * mean[segment]
+    moving = np.maximum(np.add.reduceat((~rest).astype(np.float64), first), 1.0)
+    typical = np.add.reduceat(np.where(rest, 0.0, local), first) / moving
+    return np.where(rest, typical[segment], local), rest
 
 
 def _scatter(

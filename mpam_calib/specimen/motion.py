@@ -15,6 +15,10 @@ NOISE_SDS = 10.0
 LEAVE_SDS = 7.0
 """A hold is over once the crosshead is this many standard deviations away from it."""
 
+STRAIGHT, HELD = 1.7, 0.3
+"""Ratio of two doublings of depth above which a turn has straight sides (2; a sine has √2), and the share of
+its time that such a turn must be held to count as a hold."""
+
 
 def noise_sd(values: Floats) -> float:
     """Standard deviation of the white noise on a slowly moving signal, shape (rows,) (same unit).
@@ -83,15 +87,49 @@ def detect_branch(displacement: Floats, threshold: float, sd: float) -> Ints:
         return branch
     margin = max(0.4 * threshold, LEAVE_SDS * sd)
     starts, codes = [], []
+    before = int(extremes[0])
     for first, last in pairwise(extremes):
         rise = displacement[last] - displacement[first]
         codes.append(UNLOADING if rise > 0 else LOADING)
-        starts.append(int(first) + _departure(displacement[first : last + 1], margin))
-    if starts[0] <= max(3, 0.02 * (extremes[1] - extremes[0])):
-        starts[0] = 0  # in motion from the first row, or as good as
+        turn = _turn(displacement[before : last + 1], int(first) - before, margin)
+        after_hold = int(first) + _departure(displacement[first : last + 1], margin)
+        starts.append(after_hold if turn is None else before + turn)
+        before = int(first)
+    if starts[0] <= max(3, 0.08 * (extremes[1] - extremes[0])):
+        starts[0] = 0  # in motion from the first row, if gently
     for start, end, code in zip(starts, [*starts[1:], len(branch)], codes, strict=True):
         branch[start:end] = code
     return branch
+
+
+def _turn(strokes: Floats, extreme: int, margin: float) -> int | None:
+    """The first row after the turn between two strokes; None where the crosshead was held there.
+
+    A turn lies halfway between two passages of the same place: so even the rows next to it, where the
+    crosshead hardly moves, find their side.
+    """
+    travel = np.abs(strokes - strokes[extreme])
+    passages = []
+    for depth in (1.5 * margin, 3.0 * margin, 6.0 * margin):  # a long hold wanders over one
+        inbound = np.flatnonzero(travel[:extreme] > depth)
+        outbound = np.flatnonzero(travel[extreme:] > depth)
+        if not len(inbound) or not len(outbound):
+            return None
+        i, o = int(inbound[-1]), extreme + int(outbound[0])
+        passages.append(
+            (
+                i + (travel[i] - depth) / max(travel[i] - travel[i + 1], 1e-12),
+                o - (travel[o] - depth) / max(travel[o] - travel[o - 1], 1e-12),
+            )
+        )
+    near, far, farther = (o - i for i, o in passages)
+    straight = farther - far > STRAIGHT * (far - near)
+    if straight and 2.0 * near - far > max(3.0, HELD * near):
+        return None
+    first, second = (0.5 * (i + o) for i, o in passages[:2])
+    # Strokes of different speeds shift the middle in proportion to the depth.
+    middle = first if abs(first - second) < 0.75 else 2.0 * first - second
+    return int(np.clip(np.floor(middle) + 1, np.floor(passages[0][0]) + 1, np.ceil(passages[0][1])))
 
 
 def _departure(stroke: Floats, margin: float) -> int:

@@ -21,6 +21,7 @@ from mpam_calib.criticism.candidates import candidates
 from mpam_calib.criticism.problem import build_problem
 from mpam_calib.criticism.search import search
 from mpam_calib.criticism.verdict import judge
+from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.specimen import read
 
@@ -49,7 +50,13 @@ def score_case(recipe: recipes.Recipe) -> Scored:
     one = recipes.build_case(recipe)
     with tempfile.TemporaryDirectory() as folder:
         rig_case.write_case(one, Path(folder) / "specimen", Path(folder) / "truth.json")
-        specimen = read(Path(folder) / "specimen")
+        try:
+            specimen = read(Path(folder) / "specimen")
+        except InputError:  # a muscle that pushes is refused at the door
+            truth = frozenset(one.ids)
+            return Scored(
+                one.name, one.group, truth, one.outside is not None, "refused", frozenset(), (), 0.0
+            )
     problem = build_problem(specimen, draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
     verdict = judge(search(problem, candidates(problem).tested))
     best = list(verdict.probabilities.items())[:LISTED]
@@ -84,7 +91,7 @@ def _parsed(row: dict[str, str]) -> Scored:
 
     return Scored(
         row["name"], row["group"], ids(row["truth"]), row["outside"] == "1", row["word"], ids(row["named"]),
-        tuple(ids(t) for t in row["listed"].split("|")), float(row["probability"]),
+        tuple(ids(t) for t in row["listed"].split("|") if t), float(row["probability"]),
     )  # fmt: skip
 
 
@@ -109,7 +116,7 @@ def rates(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
     outside = [s for s in scored if s.outside]
     return [
         ("separable: exact set named", sum(s.word == "named" and s.named == s.truth for s in sep), len(sep)),
-        ("separable: truth ranked first", sum(s.listed[0] == s.truth for s in sep), len(sep)),
+        ("separable: truth ranked first", sum(s.listed[:1] == (s.truth,) for s in sep), len(sep)),
         ("separable: wrong set named", sum(s.word == "named" and s.named != s.truth for s in sep), len(sep)),
         ("not separable: truth among the listed", sum(s.truth in s.listed for s in other), len(other)),
         (

@@ -12,9 +12,6 @@ from mpam_calib.model.state import Setting, State
 
 ONSET = 1.0
 """Seconds after which relaxation is counted."""
-POWER = 0.3
-SETTLING = 30.0
-"""Relaxation time of the form with a single one, s."""
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -30,18 +27,6 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, gain=state.gain * (1.0 - values["creep_per_decade"] * decades))
 
 
-def _power(state: State, values: Values, setting: Setting) -> State:
-    """A power law of the time, with the same loss over the first decade."""
-    growth = ((1.0 + state.readings.time_at_level / ONSET) ** POWER - 1.0) / (10.0**POWER - 1.0)
-    return replace(state, gain=state.gain * (1.0 - values["creep_per_decade"] * growth))
-
-
-def _settling(state: State, values: Values, setting: Setting) -> State:
-    """One relaxation time."""
-    share = -np.expm1(-state.readings.time_at_level / SETTLING)
-    return replace(state, gain=state.gain * (1.0 - 1.5 * values["creep_per_decade"] * share))
-
-
 register(
     Effect(
         id="creep",
@@ -51,7 +36,6 @@ register(
         source="logarithmic relaxation: F(1 − creep·log10(1 + t/1 s))",
         parameters=_parameters,
         apply=_apply,
-        forms={"power": _power, "settling": _settling},
         bends={"level_time": 2},
     )
 )

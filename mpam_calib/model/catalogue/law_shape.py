@@ -4,21 +4,44 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
+Array = NDArray[np.float64]
+
+TERMS = 6
+"""Polynomials beyond the law's, as far as there are levels."""
+SD = 0.3
+"""Prior sd of the lowest; the next are smaller by 2/3, 1/2."""
+
+
+def _degrees(setting: Setting) -> range:
+    """Degrees in pressure that the declared law does not already hold."""
+    first = 1 if setting.simulation.law == "constant" else 2
+    return range(first, min(first + TERMS, len(setting.levels)))
+
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
-    return (Parameter("law_bend", Normal(0.0, 0.3), "departure from the law at the top level", "", ""),)
+    return tuple(
+        Parameter(
+            f"law_bend_{j}", Normal(0.0, 2.0 * SD / (1 + number)), f"part of degree {j} in pressure", "", ""
+        )
+        for number, j in enumerate(_degrees(setting), start=1)
+    )
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    # The lowest Legendre polynomial over the levels that the declared law does not already hold.
     low, high = float(setting.levels[0]), setting.top_pressure
     x = (2.0 * state.readings.pressure - low - high) / max(high - low, 1.0)
-    bend = x if setting.simulation.law == "constant" else 0.5 * (3.0 * x**2 - 1.0)
-    return replace(state, wall_gain=state.wall_gain * (1.0 + values["law_bend"] * bend))
+    gain: Array = np.ones((1, 1))
+    for j in _degrees(setting):
+        gain = gain + values[f"law_bend_{j}"] * legendre.legval(x, [0.0] * j + [1.0])
+    return replace(state, wall_gain=state.wall_gain * gain)
 
 
 register(
@@ -27,9 +50,8 @@ register(
         stage=Stage.HISTORY,
         title="Law shape",
         sentence="the bladder's moduli change with pressure otherwise than the declared law",
-        source="bladder stress × (1 + bend·Legendre polynomial in pressure)",
+        source="bladder stress × (1 + Σ bend_j·Legendre polynomials in pressure beyond the law's)",
         parameters=_parameters,
         apply=_apply,
-        bends={"pressure": 2},
     )
 )

@@ -30,18 +30,6 @@ def _from_rest(state: State, values: Values, setting: Setting) -> State:
     return replace(state, sign=state.sign * turned)
 
 
-def _tanh(state: State, values: Values, setting: Setting) -> State:
-    """A hyperbolic tangent of the travel."""
-    turned = 2.0 * np.tanh(state.readings.travel / values["reversal_mm"]) - 1.0
-    return replace(state, sign=state.sign * turned)
-
-
-def _slow(state: State, values: Values, setting: Setting) -> State:
-    """A slow approach: many contacts that break one after another."""
-    turned = 1.0 - 2.0 / (1.0 + state.readings.travel / values["reversal_mm"])
-    return replace(state, sign=state.sign * turned)
-
-
 register(
     Effect(
         id="presliding",
@@ -51,7 +39,8 @@ register(
         source="Dahl's model at constant load: s(1 − 2 exp(−travel/reversal))",
         parameters=_parameters,
         apply=_apply,
-        forms={"rest": _from_rest, "tanh": _tanh, "slow": _slow},
+        forms={"rest": _from_rest},
+        kinds=("rest",),
         bends={"travel": 2},
     )
 )

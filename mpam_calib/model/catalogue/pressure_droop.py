@@ -18,12 +18,6 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, pressure=state.pressure * (1.0 - values["droop_percent"] * part))
 
 
-def _square(state: State, values: Values, setting: Setting) -> State:
-    """Losses that grow with the square of the stroke."""
-    part = state.displacement / setting.stroke
-    return replace(state, pressure=state.pressure * (1.0 - values["droop_percent"] * part**2))
-
-
 register(
     Effect(
         id="pressure_droop",
@@ -33,7 +27,6 @@ register(
         source="first order in the stroke: P(1 − droop·x/stroke)",
         parameters=_parameters,
         apply=_apply,
-        forms={"square": _square},
-        bends={"contraction": 2, "pressure": 1},
+        bends={"contraction": 2},
     )
 )

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import HalfNormal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -23,13 +21,6 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, displacement=state.displacement + values["compliance_mm_per_N"] * state.guide)
 
 
-def _stiffening(state: State, values: Values, setting: Setting) -> State:
-    """Contacts that stiffen under load (Hertz): the give grows with the force to the power 2/3."""
-    share = np.abs(state.guide) / setting.force_scale
-    give = values["compliance_mm_per_N"] * np.sign(state.guide) * setting.force_scale * share ** (2.0 / 3.0)
-    return replace(state, displacement=state.displacement + give)
-
-
 register(
     Effect(
         id="rig_compliance",
@@ -39,7 +30,6 @@ register(
         source="true shortening = reading + compliance × force",
         parameters=_parameters,
         apply=_apply,
-        forms={"stiffening": _stiffening},
         uses_force=True,
         bends={"force": 2},
     )

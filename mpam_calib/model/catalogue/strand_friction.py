@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import HalfNormal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -27,12 +25,6 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, strand=state.strand + values["f_s"])
 
 
-def _proportional(state: State, values: Values, setting: Setting) -> State:
-    """Friction in proportion to the pressure alone, as strong as Eq. 2.43 at the top level."""
-    share = np.maximum(state.pressure / setting.top_pressure, 1e-6)
-    return replace(state, strand=state.strand + values["f_s"] * share ** (-1.0 / 3.0))
-
-
 register(
     Effect(
         id="strand_friction",
@@ -42,7 +34,6 @@ register(
         source="thesis Eq. 2.43 (empirical)",
         parameters=_parameters,
         apply=_apply,
-        forms={"proportional": _proportional},
         needs_braid=True,
         bends={"pressure": 1, "contraction": 1},
     )

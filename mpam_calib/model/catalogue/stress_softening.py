@@ -30,19 +30,6 @@ def _force(state: State, values: Values, setting: Setting) -> State:
     return replace(state, gain=state.gain * gain)
 
 
-def _power(state: State, values: Values, setting: Setting) -> State:
-    """The whole force, fading with a power of the cycle count."""
-    gain = 1.0 + values["first_cycle_fraction"] / state.readings.cycle
-    return replace(state, gain=state.gain * gain)
-
-
-def _stretched(state: State, values: Values, setting: Setting) -> State:
-    """The whole force, more where the muscle is more contracted."""
-    part = state.displacement / setting.stroke
-    fade = np.exp(-(state.readings.cycle - 1.0))
-    return replace(state, gain=state.gain * (1.0 + 2.0 * values["first_cycle_fraction"] * part * fade))
-
-
 register(
     Effect(
         id="stress_softening",
@@ -52,7 +39,8 @@ register(
         source="exponential in the cycle count: bladder stress × (1 + fraction·e^(1 − cycle))",
         parameters=_parameters,
         apply=_apply,
-        forms={"force": _force, "power": _power, "stretched": _stretched},
+        forms={"force": _force},
+        kinds=("force",),
         bends={"cycle": 1, "contraction": 1},
     )
 )

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import Normal, Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.kinematics import SHAPES, tip_shortened_length
-
-ROUNDS = 12
-"""Damped rounds of the implicit form's fixed point."""
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -27,16 +22,6 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, length=tip_shortened_length(state.length, R, state.rest, values["tip_factor"]))
 
 
-def _implicit(state: State, values: Values, setting: Setting) -> State:
-    """The radius that shortens the tips is the one at the shortened length (fixed point)."""
-    length = state.length
-    for _ in range(ROUNDS):
-        R = SHAPES[state.kinematics](np.maximum(length, 0.1 * state.rest.L0), state.rest).R
-        target = tip_shortened_length(state.length, R, state.rest, values["tip_factor"])
-        length = 0.5 * (length + target)
-    return replace(state, length=length)
-
-
 register(
     Effect(
         id="tip_shape",
@@ -46,7 +31,6 @@ register(
         source="thesis Eq. 2.46-2.47",
         parameters=_parameters,
         apply=_apply,
-        forms={"implicit": _implicit},
         bends={"contraction": 2},
     )
 )
