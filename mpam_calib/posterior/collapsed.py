@@ -26,6 +26,7 @@ from mpam_calib.model.tensile import MISFIT, NOISE
 from mpam_calib.posterior.bins import LoopBins
 from mpam_calib.posterior.covariance import StrokeCovariance, fast_noise_log_likelihood
 from mpam_calib.posterior.points import Points, TensilePoints
+from mpam_calib.posterior.white import white_terms
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Array]
@@ -163,6 +164,8 @@ class Collapsed:
 
     def _bins(self, values: Values, bins: LoopBins, slack: list[Slack]) -> Piece:
         assert self.model.chain is not None
+        if CORRELATED not in values and ROUGH not in values and not bins.slack.any():
+            return self._white_bins(values, bins)
         n = len(bins)
         terms = self.model.chain.terms(values, bins.readings, self.guide.bins)
         fixed = 0.5 * (terms.fixed[:, :n] + terms.fixed[:, n:])
@@ -201,6 +204,21 @@ class Collapsed:
             fast = fast_noise_log_likelihood(bins.scatter, bins.averaged, white, correlated, time)
             piece = piece._replace(constant=piece.constant - 2.0 * fast)
         return piece
+
+    def _white_bins(self, values: Values, bins: LoopBins) -> Piece:
+        """Bins without correlated noise and remainder: all rows count, at less cost."""
+        assert self.model.chain is not None
+        nodes = bins.nodes
+        guide = nodes.between(self.guide.bins, bins.outward)
+        fixed, slope, columns = self.model.chain.factored(values, nodes.readings, guide)
+        white = values[WHITE][:, 0]
+        piece = white_terms(nodes, bins.averaged, fixed, slope, columns, white)
+        if sum(self.model.linear_sizes) == columns.shape[-1]:
+            return Piece(*piece)
+        k, p = sum(self.model.linear_sizes), columns.shape[-1]
+        gram, pull = np.zeros((len(white), k, k)), np.zeros((len(white), k))
+        gram[:, :p, :p], pull[:, :p] = piece[0], piece[1]
+        return Piece(gram, pull, piece[2])
 
     def _points(self, values: Values, points: Points, slack: list[Slack]) -> Piece:
         assert self.model.chain is not None

@@ -42,10 +42,10 @@ class Draws:
         return Draws(self.u[keep], {k: v[keep] for k, v in self.values.items()}, self.eta[keep], 1)
 
 
-def keep_draws(target: Collapsed, sampling: Sampling, seed: int) -> Draws:
-    """Evenly spaced draws of every ensemble, with η drawn from its exact conditional for each."""
+def keep_draws(target: Collapsed, sampling: Sampling, seed: int, kept: int | None = KEPT) -> Draws:
+    """Evenly spaced draws of every ensemble (None: all), with η drawn from its exact conditional for each."""
     E, T, W, d = sampling.chain.shape
-    keep = np.unique(np.linspace(0, T * W - 1, KEPT).astype(np.int64))
+    keep = np.unique(np.linspace(0, T * W - 1, kept or T * W).astype(np.int64))
     u = sampling.chain.reshape(E, T * W, d)[:, keep].reshape(-1, d)
     rng = np.random.default_rng([seed, 1])
     values = target.model.values(u)

@@ -169,16 +169,18 @@ class Twin:
     # --- the recordings -------------------------------------------------------------------------------
 
     def bins(self) -> list[list[int]]:
-        """Row numbers of each bin, stroke after stroke; a new stroke starts a new list of bins."""
+        """Row numbers of each bin, stroke after stroke; with white noise alone every row is one."""
         return [rows for stroke in self.strokes() for rows in stroke]
 
     def strokes(self) -> list[list[list[int]]]:
         assert self.specimen.loops is not None
         number = self.specimen.loops.stroke
+        options = self.blueprint.options
+        every_row = not (options.correlated_noise or options.remainder)
         result = []
         for stroke in dict.fromkeys(number.tolist()):
             rows = [i for i in range(len(number)) if number[i] == stroke]
-            result.append([rows[a:b] for a, b in _cuts(len(rows))])
+            result.append([[i] for i in rows] if every_row else [rows[a:b] for a, b in _cuts(len(rows))])
         return result
 
     def loop_rows(self, loops: Loops, members: list[int]) -> tuple[list[Row], Row]:

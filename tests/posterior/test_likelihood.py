@@ -129,7 +129,10 @@ CASES = [
 
 @pytest.mark.parametrize("name", CASES)
 def test_agrees_with_the_slow_twin(name):
-    """1e-8 of the log-likelihood, at parameters drawn from the prior; many at once as well as one by one."""
+    """1e-8 of the log-likelihood, at parameters drawn from the prior; many at once as well as one by one.
+
+    The twin of white noise in bins knows every row; there a force within a bin is a parabola, to 2e-4.
+    """
     made, options = case(name)
     made, blueprint = simulated(made, options)
     target = build_target(made, blueprint)
@@ -144,7 +147,7 @@ def test_agrees_with_the_slow_twin(name):
     for i in range(len(u)):
         theta = {name: float(v[i, 0]) for name, v in values.items()}
         slow = twin.log_likelihood(theta, target.guide.points, target.guide.slope)
-        assert fast[i] == pytest.approx(slow, rel=1e-8, abs=1e-8)
+        assert fast[i] == pytest.approx(slow, rel=2e-4 if name == "bins, white" else 1e-8, abs=1e-8)
         one = target.log_likelihood({k: v[i : i + 1] for k, v in values.items()})
         assert one[0] == pytest.approx(fast[i], rel=1e-11)
     prior = stats.norm.logpdf(u).sum(axis=1)
@@ -216,13 +219,7 @@ def test_parameters_without_support_have_no_density():
 
 
 def test_bins_say_what_the_rows_say():
-    """White noise: differences of log-likelihood between parameters, 32 bins a stroke against every row.
-
-    What bins lose is what rows say of the model's slope inside a bin. Between two parameter values whose
-    forces differ by Δ, that is −r·Δ/σ² + |Δ|²/2σ² with Δ's bin means taken out and white r: a normal
-    variable of sd |Δ|/σ around half its variance. Four of these sds are allowed, and a thousandth of a nat
-    for the walls' determinant.
-    """
+    """White noise: differences of log-likelihood between parameters, 32 bins a stroke against every row."""
     recorded = build.loops((100.0, 150.0, 200.0), 12.0, 320, dt=0.01)
     made, blueprint = simulated(build.specimen({"law": "linear", "order": 2}, recorded), WHITE, seed=4)
     target, modes = locate(build_target(made, blueprint), np.random.default_rng(0))
@@ -235,7 +232,7 @@ def test_bins_say_what_the_rows_say():
     assert made.loops is not None
     y = made.loops.force_N
     rows = build.rows_of(made.loops)
-    full, forces = [], []
+    full = []
     for j in range(5):
         one = {n: v[j : j + 1] for n, v in values.items()}
         terms = model.chain.terms(one, rows)
@@ -245,17 +242,9 @@ def test_bins_say_what_the_rows_say():
         pull = A.T @ (y - f) / noise**2
         quadratic = (y - f) @ (y - f) / noise**2 - pull @ np.linalg.solve(gram, pull)
         full.append(-0.5 * (quadratic + np.linalg.slogdet(gram)[1]))
-        forces.append(f + A @ target.linear_mean(one)[0])
     fast = target.log_likelihood(values)
     drop_full, drop_fast = np.array(full) - full[2], fast - fast[2]
-    starts = np.concatenate([[rows[0] for rows in Twin(made, blueprint).bins()]])
-    which = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(y))))
-    for j in (0, 1, 3, 4):
-        change = forces[j] - forces[2]
-        inside = change - (np.bincount(which, change) / np.bincount(which))[which]
-        loss = float(np.linalg.norm(inside)) / noise
-        assert loss < 0.1
-        assert abs(drop_fast[j] - drop_full[j]) < 4.0 * loss + 0.5 * loss**2 + 1e-3
+    assert drop_fast == pytest.approx(drop_full, abs=1e-3)
     assert np.all(drop_full[[0, 4]] < -1.0)
 
 
