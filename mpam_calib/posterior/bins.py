@@ -42,7 +42,7 @@ class LoopBins:
     (segments, width) layout; ``start``, ``stop`` (s) are its first and last row's times and ``dt``
     (segments,) the time between rows; ``slack`` marks bins at the floor. ``scatter`` is
     (Σ c cᵀ over chunks, their number, the contrast matrix Q, dt) of the detrended fast residuals, or None;
-    ``nodes`` are what white noise alone needs, ``outward`` (n,) is 1 where a bin contracts, else −1.
+    ``nodes`` are what white noise alone needs.
     """
 
     readings: Readings
@@ -58,7 +58,6 @@ class LoopBins:
     scatter: tuple[Array, int, Array, float] | None
     averaged: int
     nodes: Nodes
-    outward: Array
 
     def __len__(self) -> int:
         return len(self.force)
@@ -123,7 +122,6 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
         "reversal": reversal[segment],
         "speed": mean(speed),
     }
-    middle = Readings(displacement=displacement, travel=bin_travel, **common)
     halves = [
         Readings(
             displacement=displacement + side * direction * spread,
@@ -152,8 +150,7 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
         contraction_scale=float(np.ptp(displacement)) or 1.0,
         scatter=_scatter(loops, starts, stops, segment, position, dt),
         averaged=loops.averaged,
-        nodes=Nodes.build(loops.force_N, loops.pressure_Pa, loops.displacement_m, starts, middle, direction),
-        outward=direction,
+        nodes=Nodes.build(loops.force_N, row_readings(loops), _wider(starts, segment, position, most)),
     )
 
 
@@ -175,6 +172,12 @@ def _beyond_slack(
         ]
         found |= inside & (displacement >= np.median(first))
     return found
+
+
+def _wider(starts: Ints, segment: Ints, position: Ints, most: int) -> Ints:
+    """First rows of bins of twice the width, where a stroke has all its bins: a parabola fits them too."""
+    full = np.bincount(segment)[segment] > most
+    return starts[~full | (position <= len(FINE)) | ((position - len(FINE)) % 2 == 1)]
 
 
 def row_readings(loops: Loops) -> Readings:

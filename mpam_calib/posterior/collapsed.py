@@ -209,7 +209,7 @@ class Collapsed:
         """Bins without correlated noise and remainder: all rows count, at less cost."""
         assert self.model.chain is not None
         nodes = bins.nodes
-        guide = nodes.between(self.guide.bins, bins.outward)
+        guide = nodes.interpolate(self.guide.bins, bins.readings.time)
         fixed, slope, columns = self.model.chain.factored(values, nodes.readings, guide)
         white = values[WHITE][:, 0]
         piece = white_terms(nodes, bins.averaged, fixed, slope, columns, white)

@@ -21,11 +21,10 @@ SIDES = np.array([-1.0, 0.0, 1.0])[:, None]
 
 @dataclass(frozen=True)
 class Nodes:
-    """``readings`` and ``force`` (3n,), N: all lower nodes, all middles, all upper ones.
+    """``readings`` and ``force`` (3m,), N: all earlier nodes, all middles, all later ones.
 
-    ``weight`` (3n,) are the rows behind each, ``within`` (N²) is the sum of squares about the bins'
-    parabolas, ``rows`` how many there are, ``reach`` (n,) how many spreads of a bin's rows lie between its
-    middle and its outer nodes.
+    ``weight`` (3m,) are the rows behind each, ``within`` (N²) is the sum of squares about the bins'
+    parabolas, ``rows`` how many there are.
     """
 
     readings: Readings
@@ -33,65 +32,57 @@ class Nodes:
     weight: Array
     within: float
     rows: int
-    reach: Array
 
     @staticmethod
-    def build(
-        force: Array, pressure: Array, x: Array, start: NDArray[np.int64], middle: Readings, outward: Array
-    ) -> Nodes:
-        """From rows (N,) of force, pressure and displacement, and the bins' first rows and means (n,).
-
-        ``outward`` (n,) is 1 where a bin's rows contract, else −1.
-        """
+    def build(force: Array, rows: Readings, start: NDArray[np.int64]) -> Nodes:
+        """From all rows (N,) and the first row of each bin (m,)."""
         count = np.diff(np.append(start, len(force))).astype(np.float64)
         own = np.repeat(np.arange(len(start)), count.astype(np.int64))
 
         def mean(z: Array) -> Array:
             return np.asarray(np.add.reduceat(z, start) / count)
 
-        dx = x - middle.displacement[own]
-        spread = np.sqrt(mean(dx**2))
-        wide = (spread > 0.0).astype(np.float64)
-        x = dx / np.where(spread > 0.0, spread, 1.0)[own]
+        # The displacement in units of its spread, later rows above zero.
+        x = rows.displacement - mean(rows.displacement)[own]
+        spread = np.sqrt(mean(x**2))
+        last = np.append(start[1:], len(force)) - 1
+        scale = np.where(spread > 0.0, spread, 1.0) * np.where(x[last] < 0.0, -1.0, 1.0)
+        x = x / scale[own]
         # The polynomials that are orthogonal over the bin's rows, and the Gauss rule of their moments.
+        wide = (spread > 0.0).astype(np.float64)
         skew, fourth = mean(x**3), np.maximum(mean(x**4), 1.0)
         bend = x**2 - wide[own] - skew[own] * x
         size = mean(bend**2)
-        reach = np.sqrt(fourth) * wide
-        at = SIDES * reach
-        basis = at, at**2 - wide - skew * at
+        at = SIDES * np.sqrt(fourth) * wide
+        parabola = at**2 - wide - skew * at
 
         def fit(z: Array) -> tuple[Array, Array]:
-            """Values of the bins' parabolas at the nodes (3, n), and what is left of the rows."""
-            centre = mean(z)
-            slope, curve = mean(x * z), mean(bend * z) * (size > 1e-9) / np.maximum(size, 1e-9)
-            line = centre[own] + slope[own] * x
-            return centre + slope * basis[0] + curve * basis[1], z - line - curve[own] * bend
+            """Values (3, m) of the bins' parabolas at the nodes, and what is left of the rows."""
+            centre, slope = mean(z), mean(x * z)
+            curve = mean(bend * z) * (size > 1e-9) / np.maximum(size, 1e-9)
+            left = z - centre[own] - slope[own] * x - curve[own] * bend
+            return centre + slope * at + curve * parabola, left
 
         at_nodes, left = fit(force)
-        joined = Readings.join([middle] * 3)
-        travel = middle.travel + outward * spread * at
+        moving = ("pressure", "displacement", "time", "time_at_level", "travel", "speed")
         outer = 0.5 / fourth
         return Nodes(
             replace(
-                joined,
-                pressure=fit(pressure)[0].ravel(),
-                displacement=(middle.displacement + spread * at).ravel(),
-                travel=np.maximum(travel, 0.0).ravel(),
+                Readings.join([rows.take(start)] * 3),
+                **{name: fit(getattr(rows, name))[0].ravel() for name in moving},
             ),
             at_nodes.ravel(),
             (count * np.stack([outer, 1.0 - 2.0 * outer, outer])).ravel(),
             float(left @ left),
             len(force),
-            reach,
         )
 
-    def between(self, halves: Array | None, outward: Array) -> Array | None:
-        """What is known at the bins' halves (2n,: earlier rows, later rows), at the nodes instead."""
+    def interpolate(self, halves: Array | None, time: Array) -> Array | None:
+        """What is known at the two halves of bins, (2n,), whose mean times are (2n,), at the nodes."""
         if halves is None:
             return None
-        first, last = np.split(halves, 2)
-        return np.asarray(0.5 * (first + last) + SIDES * self.reach * 0.5 * outward * (last - first)).ravel()
+        middle = halves.reshape(2, -1).mean(axis=0)
+        return np.asarray(np.interp(self.readings.time, time[: len(middle)], middle))
 
 
 def white_terms(
@@ -106,8 +97,9 @@ def white_terms(
     weight = slope * nodes.weight
     p = columns.shape[-1]
     if len(columns) == 1:
-        pairs = (columns[0, :, :, None] * columns[0, :, None, :]).reshape(-1, p * p)
-        gram = ((weight * slope) @ pairs).reshape(-1, p, p)
+        i, j = np.triu_indices(p)
+        gram = np.empty((len(white), p, p))
+        gram[:, i, j] = gram[:, j, i] = (weight * slope) @ (columns[0][:, i] * columns[0][:, j])
         pull = (weight * residual) @ columns[0]
     else:
         weighted = weight[..., None] * columns
