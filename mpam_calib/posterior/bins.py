@@ -177,7 +177,8 @@ def _beyond_slack(
 def _wider(starts: Ints, segment: Ints, position: Ints, most: int) -> Ints:
     """First rows of bins of twice the width, where a stroke has all its bins: a parabola fits them too."""
     full = np.bincount(segment)[segment] > most
-    return starts[~full | (position <= len(FINE)) | ((position - len(FINE)) % 2 == 1)]
+    kept = ~full | (position <= len(FINE)) | ((position - len(FINE)) % 2 == 1)
+    return np.asarray(starts[kept])
 
 
 def row_readings(loops: Loops) -> Readings:

@@ -48,7 +48,7 @@ def autocorrelation_time(chains: Array) -> float:
     sums = 2.0 * np.cumsum(rho) - 1.0
     outside = np.arange(n) >= WINDOW * sums
     tau = float(sums[np.argmax(outside)] if outside.any() else sums[-1])
-    return share * tau + (1.0 - share) * n
+    return float(share * tau + (1.0 - share) * n)
 
 
 def _split(chains: Array) -> Array:

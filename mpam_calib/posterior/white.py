@@ -7,7 +7,7 @@ sum of squares over all rows is kept, and its cost does not depend on their numb
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,13 +64,11 @@ class Nodes:
             return centre + slope * at + curve * parabola, left
 
         at_nodes, left = fit(force)
+        at_rows = Readings.join([rows.take(start)] * 3)
         moving = ("pressure", "displacement", "time", "time_at_level", "travel", "speed")
         outer = 0.5 / fourth
         return Nodes(
-            replace(
-                Readings.join([rows.take(start)] * 3),
-                **{name: fit(getattr(rows, name))[0].ravel() for name in moving},
-            ),
+            Readings(**{**vars(at_rows), **{name: fit(getattr(rows, name))[0].ravel() for name in moving}}),
             at_nodes.ravel(),
             (count * np.stack([outer, 1.0 - 2.0 * outer, outer])).ravel(),
             float(left @ left),
