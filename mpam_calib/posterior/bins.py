@@ -41,7 +41,8 @@ class LoopBins:
     reading (N); ``count`` its number of rows; ``segment`` and ``position`` place a bin in the padded
     (segments, width) layout; ``start``, ``stop`` (s) are its first and last row's times and ``dt``
     (segments,) the time between rows; ``slack`` marks bins at the floor. ``scatter`` is
-    (Σ c cᵀ over chunks, their number, the contrast matrix Q, dt) of the detrended fast residuals, or None;
+    (Σ c cᵀ over chunks, their number, the contrast matrix Q, dt) of the detrended fast residuals, or None,
+    ``chunks`` each chunk's residuals c (chunks, dof) and its bin (chunks,);
     ``nodes`` are what white noise alone needs.
     """
 
@@ -56,6 +57,7 @@ class LoopBins:
     slack: NDArray[np.bool_]
     contraction_scale: float
     scatter: tuple[Array, int, Array, float] | None
+    chunks: tuple[Array, Ints] | None
     averaged: int
     nodes: Nodes
 
@@ -132,6 +134,7 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
     ]
     ends = stroke_starts + lengths - 1
     dt = (loops.time_s[ends] - loops.time_s[stroke_starts]) / np.maximum(lengths - 1, 1)
+    scatter, chunks = _scatter(loops, starts, stops, segment, position, dt)
     return LoopBins(
         readings=Readings.join(halves),
         force=force,
@@ -148,7 +151,8 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
             2 * loops.level[starts] + (direction > 0),
         ),
         contraction_scale=float(np.ptp(displacement)) or 1.0,
-        scatter=_scatter(loops, starts, stops, segment, position, dt),
+        scatter=scatter,
+        chunks=chunks,
         averaged=loops.averaged,
         nodes=Nodes.build(loops.force_N, row_readings(loops), _wider(starts, segment, position, most)),
     )
@@ -246,8 +250,8 @@ def _speed(loops: Loops, first: Ints, last: Ints, segment: Ints) -> Array:
 
 def _scatter(
     loops: Loops, starts: Ints, stops: Ints, segment: Ints, position: Ints, dt: Array
-) -> tuple[Array, int, Array, float] | None:
-    """Scatter matrix of detrended chunks of consecutive rows, one chunk from each regular bin."""
+) -> tuple[tuple[Array, int, Array, float], tuple[Array, Ints]] | tuple[None, None]:
+    """Scatter matrix of detrended chunks of consecutive rows, one chunk from each regular bin; and these."""
     typical = float(np.median(dt))
     rows = stops - starts
     last = np.append(segment[1:] != segment[:-1], True)
@@ -256,10 +260,10 @@ def _scatter(
     censored = np.add.reduceat(loops.censored.astype(np.float64), starts) > 0
     usable &= (rows >= 4) & ~censored
     if usable.sum() < 8:
-        return None
+        return None, None
     size = int(min(CHUNK, np.quantile(rows[usable], 0.1)))
     if size < 4:
-        return None
+        return None, None
     usable &= rows >= size
     chunks = loops.force_N[starts[usable][:, None] + np.arange(size)]
     # A parabola, however short the chunk: a slope alone would leave the force's own bend in the noise.
@@ -267,4 +271,5 @@ def _scatter(
     full, _ = np.linalg.qr(basis, mode="complete")
     contrast = full[:, 3:]
     projected = chunks @ contrast
-    return projected.T @ projected, int(usable.sum()), contrast, typical
+    pooled = projected.T @ projected, int(usable.sum()), contrast, typical
+    return pooled, (projected, np.flatnonzero(usable))
