@@ -80,7 +80,7 @@ def _ess(chains: Array) -> float:
     """Geyer's initial monotone sequence of the chains' common autocorrelation."""
     if np.ptp(chains) < np.finfo(float).resolution:
         return float(chains.size)
-    m, n = chains.shape
+    n = chains.shape[1]
     covariance = fft.irfft(_power(chains)[0].mean(axis=0))[:n] / n
     within = covariance[0] * n / (n - 1.0)
     total = covariance[0] + np.var(chains.mean(axis=1), ddof=1)
