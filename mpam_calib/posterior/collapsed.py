@@ -32,6 +32,7 @@ from mpam_calib.posterior.white import white_terms
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Array]
+Place = slice | NDArray[np.int64]
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 
@@ -153,13 +154,18 @@ class Collapsed:
 
     def _design(self, values: Values, moduli: Array, remainder: Array | None) -> Array:
         """All columns (B, n, k) out of the moduli's (B, n, p) and the remainder's (n, q)."""
-        B, n = np.broadcast_shapes(moduli.shape[:2], (len(next(iter(values.values()))), moduli.shape[1]))
-        sizes = self.model.linear_sizes
-        result = np.zeros((B, n, sum(sizes)))
-        result[:, :, : sizes[0]] = moduli
-        if remainder is not None:
-            result[:, :, sizes[0] : sizes[0] + sizes[1]] = values[SMOOTH][:, :, None] * remainder
+        result = np.zeros((len(next(iter(values.values()))), moduli.shape[1], sum(self.model.linear_sizes)))
+        self._fill(result, slice(None), values, moduli, remainder)
         return result
+
+    def _fill(
+        self, result: Array, place: Place, values: Values, moduli: Array, remainder: Array | None
+    ) -> None:
+        """Write all columns into the rows at ``place`` of an array (B, rows, k or more)."""
+        p, q, _ = self.model.linear_sizes
+        result[:, place, :p] = moduli
+        if remainder is not None:
+            result[:, place, p : p + q] = values[SMOOTH][:, :, None] * remainder
 
     def _bins(self, values: Values, bins: LoopBins, slack: list[Slack], free: list[FreeRows]) -> Piece:
         assert self.model.chain is not None
@@ -170,9 +176,8 @@ class Collapsed:
         terms = self.model.chain.terms(values, bins.readings, self.guide.bins)
         fixed = 0.5 * (terms.fixed[:, :n] + terms.fixed[:, n:])
         columns = 0.5 * (terms.columns[:, :n] + terms.columns[:, n:])
-        design = self._design(values, columns, self._bin_remainder)
-        B = len(design)
         white = values[WHITE][:, 0]
+        B = len(white)
         zero = np.zeros(B)
         correlated = values[CORRELATED][:, 0] if CORRELATED in values else zero
         time = values[TIME][:, 0] if TIME in values else zero + 1.0
@@ -189,6 +194,9 @@ class Collapsed:
             kind = np.arange(bins.segments)
         else:
             covariance = layout.matrix(white, correlated, time, rough)
+        padded = np.zeros((B, layout.pad.size, sum(self.model.linear_sizes) + 1))
+        self._fill(padded, layout.place, values, columns, self._bin_remainder)
+        padded[:, layout.place, -1] = residual
         lost = layout.pad
         if bins.slack.any():
             sd = np.sqrt(white[:, None] ** 2 + correlated[:, None] ** 2 + rough[:, None] ** 2)
@@ -198,7 +206,7 @@ class Collapsed:
             slack.append(
                 Slack(
                     np.broadcast_to(fixed, (B, n))[:, rows],
-                    design[:, rows],
+                    padded[:, bins.segment[rows] * bins.width + bins.position[rows], :-1],
                     floor,
                     np.broadcast_to(sd, floor.shape),
                 )
@@ -206,8 +214,7 @@ class Collapsed:
             lost = lost | bins.slack[layout.index]
             covariance = _forget(covariance[:, kind], lost)
             kind = np.arange(bins.segments)
-        stacked = np.concatenate([design, residual[..., None]], axis=-1)
-        padded = np.where(lost[None, :, :, None], 0.0, stacked[:, layout.index])
+            padded[:, lost.ravel()] = 0.0
         piece, weighted = _segment_piece(covariance, kind, padded, int((~lost).sum()))
         if FREEDOM in values:
             at = layout.index[~lost]
@@ -330,12 +337,14 @@ def _white_piece(design: Array, residual: Array, variance: Array) -> Piece:
 def _segment_piece(
     covariance: Array, kind: NDArray[np.int64], padded: Array, rows: int
 ) -> tuple[Piece, Array]:
-    """Correlated segments: covariance (B, K, m, m), kind (S,), [A r] padded (B, S, m, k + 1); C⁻¹[A r]."""
-    B, S, m, width = padded.shape
+    """Correlated segments: covariance (B, K, m, m), kind (S,), [A r] padded (B, S·m, k + 1); C⁻¹[A r]."""
+    B, _, width = padded.shape
+    m = covariance.shape[-1]
     log_dets = log_determinant(cholesky(covariance))
     log_det = log_dets @ np.bincount(kind, minlength=covariance.shape[1])
-    weighted = (np.linalg.inv(covariance)[:, kind] @ padded).reshape(B, S * m, width)
-    full = np.swapaxes(padded.reshape(B, S * m, width), 1, 2) @ weighted
+    inverse = np.linalg.inv(covariance)[:, kind]
+    weighted = (inverse @ padded.reshape(B, -1, m, width)).reshape(padded.shape)
+    full = np.swapaxes(padded, 1, 2) @ weighted
     piece = Piece(full[:, :-1, :-1], full[:, :-1, -1], full[:, -1, -1] + log_det + rows * LOG_2PI)
     return piece, weighted
 

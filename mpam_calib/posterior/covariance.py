@@ -87,6 +87,16 @@ class StrokeCovariance:
         result[:, :, np.arange(m), np.arange(m)] += np.where(pad, 1.0, diagonal)
         return np.asarray(result)
 
+    @cached_property
+    def place(self) -> NDArray[np.int64] | slice:
+        """Where each bin stands in the flattened layout (n,); all of it where no place is empty."""
+        seen = np.flatnonzero(~self.pad)
+        if len(seen) == self.pad.size and np.array_equal(self.index.ravel(), seen):
+            return slice(None)
+        result = np.empty(len(seen), dtype=np.int64)
+        result[self.index.ravel()[seen]] = seen
+        return result
+
     def rows_of(self, bins: LoopBins) -> Array:
         """Rows (n,) behind each bin, as its kind has them."""
         return np.asarray(self.rows[self.kind[bins.segment], bins.position])
