@@ -59,14 +59,14 @@ class Data:
 class Guide:
     """A force estimate at the bins' Gauss points and at the points (N), and the slope there (N/m).
 
-    ``bin_sites`` and ``point_sites`` stand for Student-t noise.
+    ``bin_noise`` and ``point_noise`` (N) are where the sites of Student-t noise are settled.
     """
 
     bins: Array | None = None
     points: Array | None = None
     slope: Array | None = None
-    bin_sites: Sites | None = None
-    point_sites: Sites | None = None
+    bin_noise: Array | None = None
+    point_noise: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,8 @@ class Collapsed:
 
     def _bins(self, values: Values, bins: LoopBins, slack: list[Slack], free: list[FreeRows]) -> Piece:
         assert self.model.chain is not None
-        uneven = GROWTH in values or FREEDOM in values
+        dof = values[FREEDOM][:, 0] if FREEDOM in values else None
+        uneven = GROWTH in values or dof is not None
         if not (uneven or CORRELATED in values or ROUGH in values or bins.slack.any()):
             return self._white_bins(values, bins)
         n = len(bins)
@@ -187,8 +188,8 @@ class Collapsed:
         kind = layout.kind
         if uneven:
             growth = self._growth(values, self._bin_force)
-            sites = self.guide.bin_sites or Sites.gaussian(n)
             scale = white[:, None] * growth / np.sqrt(layout.rows_of(bins) * bins.averaged)
+            sites = Sites.at(self.guide.bin_noise, scale, dof)
             residual = residual - scale * sites.shift
             covariance = layout.of_each(white, correlated, time, rough, growth, sites.spread)
             kind = np.arange(bins.segments)
@@ -216,15 +217,14 @@ class Collapsed:
             kind = np.arange(bins.segments)
             padded[:, lost.ravel()] = 0.0
         piece, weighted = _segment_piece(covariance, kind, padded, int((~lost).sum()))
-        if FREEDOM in values:
+        if dof is not None:
             at = layout.index[~lost]
             seen = weighted[:, ~lost.ravel()]
-            kept = Sites(sites.spread[at], sites.shift[at])
-            free.append(FreeRows(seen[..., :-1], seen[..., -1], scale[:, at], kept))
+            free.append(FreeRows(seen[..., :-1], seen[..., -1], scale[:, at], sites.take(at)))
         if bins.scatter is not None and bins.chunks is not None:
             if uneven:
                 covariance = fast_noise_covariance(bins.scatter, bins.averaged, white, correlated, time)
-                usual = self._usual_chunks if FREEDOM in values else np.ones(len(bins.chunks[1]), dtype=bool)
+                usual = self._usual_chunks if dof is not None else np.ones(len(bins.chunks[1]), dtype=bool)
                 at = bins.chunks[1][usual]
                 fast = chunk_log_likelihood(covariance, bins.chunks[0][usual], growth[:, at])
             else:
@@ -254,11 +254,11 @@ class Collapsed:
         return grown(values.get(GROWTH, none), force, setting.force_scale)
 
     def free_noise(self, values: Values) -> list[Array]:
-        """Noise over its scale (B, n) of the bins and then of the points, where it is Student-t."""
+        """Noise (B, n), N, of the bins and then of the points that are seen, where it is Student-t."""
         _, mean, _ = self._solve(values)
         free: list[FreeRows] = []
         self._pieces(values, [], free)
-        return [rows.noise(mean) for rows in free]
+        return [rows.scale * rows.noise(mean) for rows in free]
 
     def _white_bins(self, values: Values, bins: LoopBins) -> Piece:
         """Bins without correlated noise and remainder: all rows count, at less cost."""
@@ -303,9 +303,9 @@ class Collapsed:
             )
         if FREEDOM not in values:
             return _white_piece(design[:, seen], residual[:, seen], variance[:, seen])
-        every = self.guide.point_sites or Sites.gaussian(len(points))
-        sites = Sites(every.spread[seen], every.shift[seen])
         scale = np.sqrt(variance[:, seen])
+        noise = None if self.guide.point_noise is None else self.guide.point_noise[seen]
+        sites = Sites.at(noise, scale, values[FREEDOM][:, 0])
         spread = variance[:, seen] * sites.spread
         residual = residual[:, seen] - scale * sites.shift
         free.append(FreeRows(design[:, seen] / spread[..., None], residual / spread, scale, sites))

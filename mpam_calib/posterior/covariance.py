@@ -106,15 +106,14 @@ class StrokeCovariance:
     ) -> Array:
         """Covariance (B, S, m, m) of every stroke where noise differs from bin to bin; as :meth:`matrix`.
 
-        ``grown`` (B or 1, n) multiplies the sd of all noise of a bin, ``spread`` (n,) the variance of its
+        ``grown`` (B or 1, n) multiplies the sd of all noise of a bin, ``spread`` (B, n) the variance of its
         white part.
         """
         noise = self.matrix(white, correlated, time, np.zeros_like(rough))[:, self.kind]
         m = self.pad.shape[1]
         seen = ~self.pad
-        extra = (
-            white[:, None, None] ** 2 / (self.rows * self.averaged)[self.kind] * (spread[self.index] - 1.0)
-        )
+        extra = white[:, None, None] ** 2 / (self.rows * self.averaged)[self.kind]
+        extra = extra * (spread[:, self.index] - 1.0)
         noise[:, :, np.arange(m), np.arange(m)] += np.where(seen, extra, 0.0)
         scale = np.where(seen, grown[:, self.index], 1.0)
         noise *= scale[:, :, :, None] * scale[:, :, None, :]

@@ -1,12 +1,13 @@
 """Student-t noise in a Gaussian world: one Gaussian site stands for each row's heavy-tailed density.
 
 With z the noise of a row over its scale, −ln t_ν(z) is replaced by (z − shift)²/(2 spread), which has its
-slope and its curvature at the mode; where t's curvature is negative (rows in its tails) it is LEAST instead.
-So everything stays linear and Gaussian given θ, and the rows' weights in it are those of the mode.
+slope and its curvature where the noise (in newtons) is that of the mode. Where t's curvature is negative
+(rows in its tails) it is LEAST instead, and what all rows lack then is taken from all alike, so that their
+sum is right. So everything stays linear and Gaussian given θ.
 
 The value is then put right: at each θ the sites' density of z, at the z that the sites lead to, is replaced
 by t_ν's own. This is Laplace's approximation in η, in the strokes' own remainder and in the correlated
-noise, with one Newton step from the mode's sites and their curvature. It is exact for ν → ∞; else its error
+noise, with one Newton step from the mode and the curvature there. It is exact for ν → ∞; else its error
 grows with what a single row weighs in the fit. Only the white part of a bin's mean (or of a point) is
 Student-t. The scatter inside bins has another remedy: chunks far above those of similar force are left out.
 """
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 LOG_2PI = float(np.log(2.0 * np.pi))
 LEAST = 0.02
 """Smallest curvature of a site: a fiftieth of a Gaussian row's."""
+LEAST_SHARE = 0.3
+"""Smallest share of the positive curvatures that the negative ones may leave."""
 NEIGHBOURS = 41
 """Chunks of about the same force, among which one is judged."""
 RARE = 1e-5
@@ -33,38 +36,38 @@ FAR = 4.0
 
 
 class Sites(NamedTuple):
-    """Gaussian stand-ins for rows (n,), in units of each row's scale (and its square)."""
+    """Gaussian stand-ins for rows (B, n), in units of each row's scale (and its square)."""
 
     spread: Array
     shift: Array
 
     @staticmethod
-    def gaussian(n: int) -> Sites:
-        """Before anything is known: ν → ∞."""
-        return Sites(np.ones(n), np.zeros(n))
+    def at(noise: Array | None, scale: Array, dof: Array | None) -> Sites:
+        """Sites of rows with this noise (n,) at the mode, scales (B, n) and degrees of freedom (B,).
+
+        Gaussian ones where the noise is Gaussian, or not known yet.
+        """
+        if noise is None or dof is None:
+            return Sites(np.ones_like(scale), np.zeros_like(scale))
+        return Sites.settle(noise / scale, dof[:, None])
 
     @staticmethod
-    def settle(z: Array, dof: float) -> Sites:
-        """The sites of rows whose noise is z (n,) scales at the mode."""
+    def settle(z: Array, dof: Array | float) -> Sites:
+        """The sites that touch t_ν where the noise is z scales."""
         slope = (dof + 1.0) * z / (dof + z**2)
         bend = (dof + 1.0) * (dof - z**2) / (dof + z**2) ** 2
-        spread = 1.0 / np.maximum(bend, LEAST)
+        kept = np.maximum(bend, LEAST)
+        share = bend.sum(axis=-1, keepdims=True) / kept.sum(axis=-1, keepdims=True)
+        spread = 1.0 / (kept * np.clip(share, LEAST_SHARE, 1.0))
         return Sites(spread, z - spread * slope)
 
-    def put(self, rows: NDArray[np.bool_], others: Sites) -> Sites:
-        """These sites with others in the marked rows, in their order."""
-        spread, shift = self.spread.copy(), self.shift.copy()
-        spread[rows], shift[rows] = others
-        return Sites(spread, shift)
-
-    def moved(self, other: Sites) -> float:
-        """The largest difference of the rows' pulls (at z = 0) and curvatures."""
-        pull = np.abs(self.shift / self.spread - other.shift / other.spread)
-        return float(np.max(np.maximum(pull, np.abs(1.0 / self.spread - 1.0 / other.spread)), initial=0.0))
+    def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Sites:
+        """Sites of some rows."""
+        return Sites(self.spread[:, rows], self.shift[:, rows])
 
 
 class FreeRows(NamedTuple):
-    """Rows under sites: C⁻¹A (B, n, k) and C⁻¹r (B, n) of the Gaussian system, scales (B, n), sites (n,)."""
+    """Rows under sites: C⁻¹A (B, n, k) and C⁻¹r (B, n) of the Gaussian system, scales and sites (B, n)."""
 
     design: Array
     residual: Array
@@ -92,7 +95,7 @@ def usual_chunks(chunks: Array, force: Array) -> NDArray[np.bool_]:
     power = np.mean(chunks**2, axis=1)
     order = np.argsort(np.abs(force), kind="stable")
     typical = np.empty_like(power)
-    typical[order] = ndimage.median_filter(power[order], size=min(NEIGHBOURS, len(power)), mode="nearest")
+    typical[order] = ndimage.median_filter(power[order], size=min(NEIGHBOURS, len(power)), mode="reflect")
     dof = chunks.shape[1]
     limit = max(FAR, float(stats.chi2.isf(RARE, dof) / stats.chi2.median(dof)))
     return np.asarray(power <= limit * typical)

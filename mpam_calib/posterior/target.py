@@ -16,7 +16,7 @@ from mpam_calib.posterior.bins import bin_loops
 from mpam_calib.posterior.collapsed import Collapsed, Data, Guide
 from mpam_calib.posterior.mode import Mode, climb_modes, find_modes
 from mpam_calib.posterior.points import gather_points, gather_tensile
-from mpam_calib.posterior.sites import Sites
+from mpam_calib.posterior.sites import LEAST_SHARE
 from mpam_calib.specimen.recording import Specimen
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ GUIDE_ROUNDS, SITE_ROUNDS = 4, 12
 GUIDE_TOLERANCE = 0.02
 """Share of the noise by which a guide force may still move between rounds."""
 SITE_TOLERANCE = 0.02
-"""What a site's pull and curvature (1 for a Gaussian row) may still change."""
+"""Share of the typical noise by which that of a heavy-tailed row may still move."""
 SLOPE_STEP = 1e-3
 """Contraction step of the slope at a free contraction."""
 
@@ -64,9 +64,19 @@ def locate(target: Collapsed, rng: np.random.Generator) -> tuple[Collapsed, list
     start = _bursts(target, found[1][0].u)
     other = found[0]
     for _ in range(SITE_ROUNDS):
-        other = replace(other, guide=_guide(other, start))
+        other = replace(other, guide=_eased(other.guide, _guide(other, start)))
     bursts = _settle(other, climb_modes(other, [start]))
     return max((found, bursts), key=lambda pair: pair[1][0].log_posterior)
+
+
+def _eased(old: Guide, new: Guide) -> Guide:
+    """The new guide with heavy-tailed noise on the way to its own: with all curvatures a step overshoots."""
+
+    def between(before: Array | None, after: Array | None) -> Array | None:
+        return after if before is None or after is None else before + LEAST_SHARE * (after - before)
+
+    bins = between(old.bin_noise, new.bin_noise)
+    return replace(new, bin_noise=bins, point_noise=between(old.point_noise, new.point_noise))
 
 
 def _settle(target: Collapsed, modes: list[Mode]) -> tuple[Collapsed, list[Mode]]:
@@ -94,9 +104,9 @@ def _guide(target: Collapsed, u: Array) -> Guide:
     values = model.values(u[None])
     eta = target.linear_mean(values)
     bins = None if data.bins is None else predict_force(model, values, eta, data.bins.readings)[0]
-    sites = _sites(target, values)
+    heavy = _heavy_noise(target, values)
     if data.points is None or model.setting is None:
-        return Guide(bins, bin_sites=sites[0])
+        return Guide(bins, bin_noise=heavy[0])
     rows = data.points.readings
     step = SLOPE_STEP * model.setting.geometry.L0
     shifted = [
@@ -104,21 +114,23 @@ def _guide(target: Collapsed, u: Array) -> Guide:
         for side in (-1.0, 1.0)
     ]
     slope = (shifted[1] - shifted[0]) / (2.0 * step)
-    return Guide(bins, predict_force(model, values, eta, rows)[0], slope, *sites)
+    return Guide(bins, predict_force(model, values, eta, rows)[0], slope, *heavy)
 
 
-def _sites(target: Collapsed, values: dict[str, Array]) -> tuple[Sites | None, Sites | None]:
-    """Sites of the bins and of the points at the mode; rows that are not seen keep Gaussian ones."""
+def _heavy_noise(target: Collapsed, values: dict[str, Array]) -> tuple[Array | None, Array | None]:
+    """Noise (n,), N, of the bins and of the points at the mode where it is heavy-tailed; 0 in slack rows."""
     if FREEDOM not in values:
         return None, None
-    data, dof = target.data, float(values[FREEDOM][0, 0])
-    noise = target.free_noise(values)
-    found: list[Sites | None] = [None, None]
-    if data.bins is not None:
-        found[0] = Sites.gaussian(len(data.bins)).put(~data.bins.slack, Sites.settle(noise.pop(0)[0], dof))
-    if data.points is not None:
-        seen = ~data.points.censored
-        found[1] = Sites.gaussian(len(data.points)).put(seen, Sites.settle(noise.pop(0)[0], dof))
+    noise = [each[0] for each in target.free_noise(values)]
+    found: list[Array | None] = []
+    bins, points = target.data.bins, target.data.points
+    for slack in (None if bins is None else bins.slack, None if points is None else points.censored):
+        if slack is None:
+            found.append(None)
+            continue
+        whole = np.zeros(len(slack))
+        whole[~slack] = noise.pop(0)
+        found.append(whole)
     return found[0], found[1]
 
 
@@ -127,8 +139,11 @@ def _matters(target: Collapsed, guide: Guide) -> bool:
     old, chain, data = target.guide, target.model.chain, target.data
     if chain is None:
         return False
-    for sites, before in ((guide.bin_sites, old.bin_sites), (guide.point_sites, old.point_sites)):
-        if sites is not None and sites.moved(before or Sites.gaussian(len(sites.spread))) > SITE_TOLERANCE:
+    for noise, before in ((guide.bin_noise, old.bin_noise), (guide.point_noise, old.point_noise)):
+        if noise is None:
+            continue
+        typical = float(np.median(np.abs(noise)))
+        if before is None or float(np.max(np.abs(noise - before))) > SITE_TOLERANCE * typical:
             return True
     signs = any(item is not None and bool(np.any(item < 0.0)) for item in (guide.bins, guide.points))
     slopes = data.points is not None and bool(np.any(data.points.kind == 2))
