@@ -9,13 +9,14 @@ export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help calibrate test test-long score lint sample clean
+.PHONY: help calibrate test test-long score benchmark lint sample clean
 
 help:
 	@echo "make calibrate   calibrate the bundled data sets; reports in reports/*/report.html"
 	@echo "make test        linters, types, doctests and the test suite"
 	@echo "make test-long   statistical tests of several minutes"
 	@echo "make score       score diagnose on the locked hidden cases (resumable; SET=develop for the others)"
+	@echo "make benchmark   times the sampler beside nutpie and PyMC, in an environment of its own"
 	@echo "make lint        linters and types alone"
 	@echo "make sample      make $(SAMPLE) again (the picture needs chromium)"
 	@echo "make clean       remove the virtual environment, reports and caches"
@@ -43,6 +44,16 @@ SET ?= locked
 score: $(VENV)/.installed
 	cd tests && ../$(BIN)/python -W ignore -m criticism.score $(SET)
 
+BENCHMARKS := .venv-benchmarks
+$(BENCHMARKS)/.installed: pyproject.toml tests/benchmarks/requirements.txt
+	@$(PYTHON) -m venv $(BENCHMARKS)
+	$(BENCHMARKS)/bin/python -m pip install --quiet --upgrade pip
+	$(BENCHMARKS)/bin/python -m pip install --quiet -e . -r tests/benchmarks/requirements.txt
+	@touch $@
+
+benchmark: $(BENCHMARKS)/.installed
+	@cd tests && ../$(BENCHMARKS)/bin/python -W ignore -m benchmarks
+
 lint: $(VENV)/.installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -56,5 +67,5 @@ sample: $(VENV)/.installed
 	  --screenshot=$(SAMPLE)/report.png file://$(CURDIR)/$(SAMPLE)/report.html 2>/dev/null
 
 clean:
-	rm -rf $(VENV) build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(BENCHMARKS) build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find reports -mindepth 1 -maxdepth 1 ! -name sample -exec rm -rf {} +

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict
 
 from mpam_calib.model.reference import force_scale, geometric_contraction
 from mpam_calib.model.state import Setting
-from mpam_calib.specimen.declaration import Braid, Geometry, Sensors, Simulation
+from mpam_calib.specimen.declaration import Braid, Geometry, Noise, Sensors, Simulation
 from mpam_calib.specimen.recording import Loops, Specimen
 from mpam_calib.units import MINUTE, MM
 
@@ -62,6 +62,7 @@ class Blueprint(Value):
     geometry: Geometry | None
     braid: Braid | None
     sensors: Sensors
+    noise: Noise = Noise()
     levels: tuple[float, ...]
     stroke: float
     reach: tuple[float, ...]
@@ -116,6 +117,7 @@ def draw_blueprint(
         geometry=specimen.geometry,
         braid=specimen.braid,
         sensors=specimen.sensors,
+        noise=specimen.noise,
         levels=tuple(float(level) for level in specimen.levels_Pa),
         stroke=stroke,
         reach=tuple(float(r) for r in reach),

@@ -16,7 +16,11 @@ from numpy.typing import NDArray
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.moduli import Law, ModuliBlock
-from mpam_calib.model.noise import correlated_noise_parameters, white_noise_parameter
+from mpam_calib.model.noise import (
+    correlated_noise_parameters,
+    declared_noise_parameters,
+    white_noise_parameter,
+)
 from mpam_calib.model.priors import LogNormal, Parameter
 from mpam_calib.model.reference import reference_shape, rest_of
 from mpam_calib.model.remainder import Remainder, remainder_parameters
@@ -88,6 +92,7 @@ def build_model(blueprint: Blueprint) -> Model:
         extra.append(white_noise_parameter(setting))
         if blueprint.stroke_time is not None and options.correlated_noise:
             extra += correlated_noise_parameters(setting, blueprint.stroke_time, blueprint.reading_time)
+        extra += declared_noise_parameters(blueprint.noise)
         if blueprint.free_contraction:
             prior = LogNormal(0.003, 0.7)
             extra.append(Parameter(CONTRACTION_SD, prior, "noise of one contraction reading", "", ""))

@@ -1,11 +1,22 @@
-"""Sensor noise: white, and a part that is correlated along time for much less than a stroke."""
+"""Sensor noise: white, and a part that is correlated along time for much less than a stroke.
+
+Where the declaration allows it, all of it grows with the force, sd(F) = sd·√(1 + (g F/force scale)²), and
+the white part of a bin (or of a point) is Student-t: its sd is then the scale of that distribution.
+"""
 
 from __future__ import annotations
 
-from mpam_calib.model.priors import LogNormal, LogUniform, Parameter
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.priors import HalfNormal, LogNormal, LogUniform, Parameter
 from mpam_calib.model.state import Setting
+from mpam_calib.specimen.declaration import Noise
+
+Array = NDArray[np.float64]
 
 WHITE, CORRELATED, TIME = "noise_sd_N", "noise_corr_sd_N", "noise_corr_time_s"
+GROWTH, FREEDOM = "noise_growth", "noise_dof"
 
 
 def white_noise_parameter(setting: Setting) -> Parameter:
@@ -32,3 +43,20 @@ def correlated_noise_parameters(
             TIME, LogUniform(shortest, max(stroke_time / 30.0, 2.0 * shortest)), "how long that moment is"
         ),
     )
+
+
+def declared_noise_parameters(noise: Noise) -> tuple[Parameter, ...]:
+    """What ``[noise]`` adds: growth g (at 1 the noise is √2-fold at the force scale), degrees of freedom."""
+    found = []
+    if noise.growth:
+        found.append(Parameter(GROWTH, HalfNormal(3.0), "how the noise grows with the force", "", ""))
+    if noise.robust:
+        found.append(
+            Parameter(FREEDOM, LogNormal(20.0, 1.0), "degrees of freedom of the white noise", "", "")
+        )
+    return tuple(found)
+
+
+def grown(growth: Array, force: Array, force_scale: float) -> Array:
+    """Factor √(1 + (g F/force scale)²) on the noise at a force (N); arrays broadcast."""
+    return np.asarray(np.sqrt(1.0 + (growth * force / force_scale) ** 2))

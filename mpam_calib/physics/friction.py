@@ -30,4 +30,4 @@ def coulomb_factor(K_f: Array, sign: Array, force_sign: Array) -> Array:
 
     ``sign`` s is +1 loading, −1 unloading, 0 at rest.
     """
-    return 1.0 + K_f * sign * force_sign
+    return 1.0 + K_f * (sign * force_sign)

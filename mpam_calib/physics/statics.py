@@ -15,13 +15,13 @@ Array = NDArray[np.float64]
 
 def gas_force(P: Array, shape: Shape) -> Array:
     """Gaylord's force of the gas on a thin wall: Pπ R² (2T − 1) (first term of thesis Eq. 3.16)."""
-    return P * np.pi * shape.R**2 * (2.0 * shape.T - 1.0)
+    return P * (np.pi * shape.R**2 * (2.0 * shape.T - 1.0))
 
 
 def thickness_force(P: Array, shape: Shape) -> Array:
     """What the wall's thickness takes from it: Pπ [(2Rt − t²) − 2tRT] (thesis Eq. 2.9, 3.16)."""
     R, t = shape.R, shape.t
-    return P * np.pi * ((2.0 * R * t - t**2) - 2.0 * t * R * shape.T)
+    return P * (np.pi * ((2.0 * R * t - t**2) - 2.0 * t * R * shape.T))
 
 
 def axial_lever(shape: Shape) -> Array:

@@ -41,7 +41,9 @@ class LoopBins:
     (segments, width) layout; ``start``, ``stop`` (s) are its first and last row's times and ``dt``
     (segments,) the time between rows; ``slack`` marks bins at the floor, ``rest`` is the share of a bin's
     rows at rest. ``scatter`` is
-    (Σ c cᵀ over chunks, their number, the contrast matrix Q, dt) of the detrended fast residuals, or None.
+    (Σ c cᵀ over chunks, their number, the contrast matrix Q, dt) of the detrended fast residuals, or None,
+    ``chunks`` each chunk's residuals c (chunks, dof) and its bin (chunks,);
+    ``nodes`` are what white noise alone needs.
     """
 
     readings: Readings
@@ -56,7 +58,9 @@ class LoopBins:
     rest: Array
     contraction_scale: float
     scatter: tuple[Array, int, Array, float] | None
+    chunks: tuple[Array, Ints] | None
     averaged: int
+    nodes: Nodes
 
     def __len__(self) -> int:
         return len(self.force)
@@ -140,6 +144,7 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
     ]
     ends = stroke_starts + lengths - 1
     dt = (loops.time_s[ends] - loops.time_s[stroke_starts]) / np.maximum(lengths - 1, 1)
+    scatter, chunks = _scatter(loops, starts, stops, segment, position, dt)
     return LoopBins(
         readings=Readings.join(halves),
         force=force,
@@ -157,8 +162,10 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
         ),
         rest=mean(rest.astype(np.float64)),
         contraction_scale=float(np.ptp(displacement)) or 1.0,
-        scatter=_scatter(loops, starts, stops, segment, position, dt),
+        scatter=scatter,
+        chunks=chunks,
         averaged=loops.averaged,
+        nodes=Nodes.build(loops.force_N, row_readings(loops), _wider(starts, segment, position, most)),
     )
 
 
@@ -180,6 +187,13 @@ def _beyond_slack(
         ]
         found |= inside & (displacement >= np.median(first))
     return found
+
+
+def _wider(starts: Ints, segment: Ints, position: Ints, most: int) -> Ints:
+    """First rows of bins of twice the width, where a stroke has all its bins: a parabola fits them too."""
+    full = np.bincount(segment)[segment] > most
+    kept = ~full | (position <= len(FINE)) | ((position - len(FINE)) % 2 == 1)
+    return np.asarray(starts[kept])
 
 
 def row_readings(loops: Loops) -> Readings:
@@ -248,8 +262,8 @@ def _speed(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array,
 
 def _scatter(
     loops: Loops, starts: Ints, stops: Ints, segment: Ints, position: Ints, dt: Array
-) -> tuple[Array, int, Array, float] | None:
-    """Scatter matrix of detrended chunks of consecutive rows, one chunk from each regular bin."""
+) -> tuple[tuple[Array, int, Array, float], tuple[Array, Ints]] | tuple[None, None]:
+    """Scatter matrix of detrended chunks of consecutive rows, one chunk from each regular bin; and these."""
     typical = float(np.median(dt))
     rows = stops - starts
     last = np.append(segment[1:] != segment[:-1], True)
@@ -258,10 +272,10 @@ def _scatter(
     censored = np.add.reduceat(loops.censored.astype(np.float64), starts) > 0
     usable &= (rows >= 4) & ~censored
     if usable.sum() < 8:
-        return None
+        return None, None
     size = int(min(CHUNK, np.quantile(rows[usable], 0.1)))
     if size < 4:
-        return None
+        return None, None
     usable &= rows >= size
     chunks = loops.force_N[starts[usable][:, None] + np.arange(size)]
     # A parabola, however short the chunk: a slope alone would leave the force's own bend in the noise.
@@ -269,4 +283,5 @@ def _scatter(
     full, _ = np.linalg.qr(basis, mode="complete")
     contrast = full[:, 3:]
     projected = chunks @ contrast
-    return projected.T @ projected, int(usable.sum()), contrast, typical
+    pooled = projected.T @ projected, int(usable.sum()), contrast, typical
+    return pooled, (projected, np.flatnonzero(usable))

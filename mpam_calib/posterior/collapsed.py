@@ -4,12 +4,12 @@ y = f(θ) + A(θ) η + ε, η ~ N(0, I), ε ~ N(0, C(θ)), so with S = I + Aᵀ 
     ln p(y | θ) = −½ [(y − f)ᵀ C⁻¹ (y − f) − hᵀ S⁻¹ h + ln|C| + ln|S| + n ln 2π],
     η | θ, y ~ N(S⁻¹ h, S⁻¹).
 Slack rows enter through the probability of being slack and a Laplace approximation in η
-(:func:`_with_slack`).
+(:mod:`mpam_calib.posterior.slack`), Student-t noise through one Gaussian site for each row
+(:mod:`mpam_calib.posterior.sites`).
 """
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,23 +17,24 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from mpam_calib.model.model import CONTRACTION_SD, Model
-from mpam_calib.model.noise import CORRELATED, TIME, WHITE
+from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
+from mpam_calib.posterior.algebra import cholesky, log_determinant, solve
 from mpam_calib.posterior.bins import LoopBins
-from mpam_calib.posterior.covariance import StrokeCovariance, fast_noise_log_likelihood
+from mpam_calib.posterior.covariance import StrokeCovariance, fast_noise_covariance, fast_noise_log_likelihood
 from mpam_calib.posterior.points import Points, TensilePoints
+from mpam_calib.posterior.sites import FreeRows, Sites, chunk_log_likelihood, usual_chunks
+from mpam_calib.posterior.slack import Slack, with_slack
+from mpam_calib.posterior.white import white_terms
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Array]
+Place = slice | NDArray[np.int64]
 
 LOG_2PI = float(np.log(2.0 * np.pi))
-NEWTON_STEPS = 6
-WRONG_FLAG = 0.01
-"""Share of slack flags that may be wrong: one of them must not outweigh all other readings."""
 
 
 class Piece(NamedTuple):
@@ -42,15 +43,6 @@ class Piece(NamedTuple):
     gram: Array
     pull: Array
     constant: Array
-
-
-class Slack(NamedTuple):
-    """Censored rows: force (B, n) without η, its columns (B, n, k), floor and sd (B, n), N."""
-
-    fixed: Array
-    columns: Array
-    floor: Array
-    sd: Array
 
 
 @dataclass(frozen=True)
@@ -65,11 +57,16 @@ class Data:
 
 @dataclass(frozen=True)
 class Guide:
-    """A force estimate at the bins' Gauss points and at the points (N), and the slope there (N/m)."""
+    """A force estimate at the bins' Gauss points and at the points (N), and the slope there (N/m).
+
+    ``bin_noise`` and ``point_noise`` (N) are where the sites of Student-t noise are settled.
+    """
 
     bins: Array | None = None
     points: Array | None = None
     slope: Array | None = None
+    bin_noise: Array | None = None
+    point_noise: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -114,22 +111,26 @@ class Collapsed:
         pull = np.zeros((B, k))
         constant = np.zeros(B)
         slack: list[Slack] = []
-        for piece in self._pieces(values, slack):
+        free: list[FreeRows] = []
+        for piece in self._pieces(values, slack, free):
             gram += piece.gram
             pull += piece.pull
             constant = constant + piece.constant
         if slack:
-            return _with_slack(gram, pull, constant, slack)
-        factor = _cholesky(gram)
-        mean = _solve(gram, pull)
-        return _gaussian(constant, pull, mean, factor), mean, factor
+            value, mean, factor = with_slack(gram, pull, constant, slack)
+        else:
+            factor, mean = cholesky(gram), solve(gram, pull)
+            value = -0.5 * (constant - np.einsum("bk,bk->b", pull, mean) + log_determinant(factor))
+        for rows in free:
+            value = value + rows.correction(mean, values[FREEDOM][:, 0])
+        return value, mean, factor
 
-    def _pieces(self, values: Values, slack: list[Slack]) -> list[Piece]:
+    def _pieces(self, values: Values, slack: list[Slack], free: list[FreeRows]) -> list[Piece]:
         pieces = []
         if self.data.bins is not None:
-            pieces.append(self._bins(values, self.data.bins, slack))
+            pieces.append(self._bins(values, self.data.bins, slack, free))
         if self.data.points is not None:
-            pieces.append(self._points(values, self.data.points, slack))
+            pieces.append(self._points(values, self.data.points, slack, free))
         if self.data.tensile is not None and self.model.tensile is not None:
             pieces.append(self._tensile(values, self.data.tensile))
         return pieces
@@ -153,30 +154,50 @@ class Collapsed:
 
     def _design(self, values: Values, moduli: Array, remainder: Array | None) -> Array:
         """All columns (B, n, k) out of the moduli's (B, n, p) and the remainder's (n, q)."""
-        B, n = np.broadcast_shapes(moduli.shape[:2], (len(next(iter(values.values()))), moduli.shape[1]))
-        sizes = self.model.linear_sizes
-        result = np.zeros((B, n, sum(sizes)))
-        result[:, :, : sizes[0]] = moduli
-        if remainder is not None:
-            result[:, :, sizes[0] : sizes[0] + sizes[1]] = values[SMOOTH][:, :, None] * remainder
+        result = np.zeros((len(next(iter(values.values()))), moduli.shape[1], sum(self.model.linear_sizes)))
+        self._fill(result, slice(None), values, moduli, remainder)
         return result
 
-    def _bins(self, values: Values, bins: LoopBins, slack: list[Slack]) -> Piece:
+    def _fill(
+        self, result: Array, place: Place, values: Values, moduli: Array, remainder: Array | None
+    ) -> None:
+        """Write all columns into the rows at ``place`` of an array (B, rows, k or more)."""
+        p, q, _ = self.model.linear_sizes
+        result[:, place, :p] = moduli
+        if remainder is not None:
+            result[:, place, p : p + q] = values[SMOOTH][:, :, None] * remainder
+
+    def _bins(self, values: Values, bins: LoopBins, slack: list[Slack], free: list[FreeRows]) -> Piece:
         assert self.model.chain is not None
+        dof = values[FREEDOM][:, 0] if FREEDOM in values else None
+        uneven = GROWTH in values or dof is not None
+        if not (uneven or CORRELATED in values or ROUGH in values or bins.slack.any()):
+            return self._white_bins(values, bins)
         n = len(bins)
         terms = self.model.chain.terms(values, bins.readings, self.guide.bins)
         fixed = 0.5 * (terms.fixed[:, :n] + terms.fixed[:, n:])
         columns = 0.5 * (terms.columns[:, :n] + terms.columns[:, n:])
-        design = self._design(values, columns, self._bin_remainder)
-        B = len(design)
         white = values[WHITE][:, 0]
+        B = len(white)
         zero = np.zeros(B)
         correlated = values[CORRELATED][:, 0] if CORRELATED in values else zero
         time = values[TIME][:, 0] if TIME in values else zero + 1.0
         rough = values[ROUGH][:, 0] if ROUGH in values else zero
         layout = self._layout
-        covariance = layout.matrix(white, correlated, time, rough)
         residual = np.broadcast_to(bins.force - fixed, (B, n))
+        kind = layout.kind
+        if uneven:
+            growth = self._growth(values, self._bin_force)
+            scale = white[:, None] * growth / np.sqrt(layout.rows_of(bins) * bins.averaged)
+            sites = Sites.at(self.guide.bin_noise, scale, dof)
+            residual = residual - scale * sites.shift
+            covariance = layout.of_each(white, correlated, time, rough, growth, sites.spread)
+            kind = np.arange(bins.segments)
+        else:
+            covariance = layout.matrix(white, correlated, time, rough)
+        padded = np.zeros((B, layout.pad.size, sum(self.model.linear_sizes) + 1))
+        self._fill(padded, layout.place, values, columns, self._bin_remainder)
+        padded[:, layout.place, -1] = residual
         lost = layout.pad
         if bins.slack.any():
             sd = np.sqrt(white[:, None] ** 2 + correlated[:, None] ** 2 + rough[:, None] ** 2)
@@ -186,33 +207,88 @@ class Collapsed:
             slack.append(
                 Slack(
                     np.broadcast_to(fixed, (B, n))[:, rows],
-                    design[:, rows],
+                    padded[:, bins.segment[rows] * bins.width + bins.position[rows], :-1],
                     floor,
                     np.broadcast_to(sd, floor.shape),
                 )
             )
             lost = lost | bins.slack[layout.index]
-            covariance = _forget(covariance[:, layout.kind], lost)
-        stacked = np.concatenate([design, residual[..., None]], axis=-1)
-        padded = np.where(lost[None, :, :, None], 0.0, stacked[:, layout.index])
-        kind = np.arange(len(lost)) if bins.slack.any() else layout.kind
-        piece = _segment_piece(covariance, kind, padded, int((~lost).sum()))
-        if bins.scatter is not None:
-            fast = fast_noise_log_likelihood(bins.scatter, bins.averaged, white, correlated, time)
+            covariance = _forget(covariance[:, kind], lost)
+            kind = np.arange(bins.segments)
+            padded[:, lost.ravel()] = 0.0
+        piece, weighted = _segment_piece(covariance, kind, padded, int((~lost).sum()))
+        if dof is not None:
+            at = layout.index[~lost]
+            seen = weighted[:, ~lost.ravel()]
+            free.append(FreeRows(seen[..., :-1], seen[..., -1], scale[:, at], sites.take(at)))
+        if bins.scatter is not None and bins.chunks is not None:
+            if uneven:
+                covariance = fast_noise_covariance(bins.scatter, bins.averaged, white, correlated, time)
+                usual = self._usual_chunks if dof is not None else np.ones(len(bins.chunks[1]), dtype=bool)
+                at = bins.chunks[1][usual]
+                fast = chunk_log_likelihood(covariance, bins.chunks[0][usual], growth[:, at])
+            else:
+                fast = fast_noise_log_likelihood(bins.scatter, bins.averaged, white, correlated, time)
             piece = piece._replace(constant=piece.constant - 2.0 * fast)
         return piece
 
-    def _points(self, values: Values, points: Points, slack: list[Slack]) -> Piece:
+    @property
+    def _bin_force(self) -> Array:
+        """Force (n,) by which the noise of bins grows: the guide's, at first the measured one."""
+        assert self.data.bins is not None
+        if self.guide.bins is None:
+            return self.data.bins.force
+        return np.asarray(self.guide.bins.reshape(2, -1).mean(axis=0))
+
+    @cached_property
+    def _usual_chunks(self) -> NDArray[np.bool_]:
+        bins = self.data.bins
+        assert bins is not None and bins.chunks is not None
+        return usual_chunks(bins.chunks[0], bins.force[bins.chunks[1]])
+
+    def _growth(self, values: Values, force: Array) -> Array:
+        """Factor (B, n) on the noise's sd."""
+        setting = self.model.setting
+        assert setting is not None
+        none = np.zeros_like(values[WHITE])
+        return grown(values.get(GROWTH, none), force, setting.force_scale)
+
+    def free_noise(self, values: Values) -> list[Array]:
+        """Noise (B, n), N, of the bins and then of the points that are seen, where it is Student-t."""
+        _, mean, _ = self._solve(values)
+        free: list[FreeRows] = []
+        self._pieces(values, [], free)
+        return [rows.scale * rows.noise(mean) for rows in free]
+
+    def _white_bins(self, values: Values, bins: LoopBins) -> Piece:
+        """Bins without correlated noise and remainder: all rows count, at less cost."""
+        assert self.model.chain is not None
+        nodes = bins.nodes
+        guide = nodes.interpolate(self.guide.bins, bins.readings.time)
+        fixed, slope, columns = self.model.chain.factored(values, nodes.readings, guide)
+        white = values[WHITE][:, 0]
+        piece = white_terms(nodes, bins.averaged, fixed, slope, columns, white)
+        if sum(self.model.linear_sizes) == columns.shape[-1]:
+            return Piece(*piece)
+        k, p = sum(self.model.linear_sizes), columns.shape[-1]
+        gram, pull = np.zeros((len(white), k, k)), np.zeros((len(white), k))
+        gram[:, :p, :p], pull[:, :p] = piece[0], piece[1]
+        return Piece(gram, pull, piece[2])
+
+    def _points(self, values: Values, points: Points, slack: list[Slack], free: list[FreeRows]) -> Piece:
         assert self.model.chain is not None
         terms = self.model.chain.terms(values, points.readings, self.guide.points)
         design = self._design(values, terms.columns, self._point_remainder)
         B = len(design)
         variance = np.broadcast_to(values[WHITE] ** 2, (B, len(points))).copy()
-        free = points.kind == 2
-        if free.any():
+        if GROWTH in values:
+            force = points.force if self.guide.points is None else self.guide.points
+            variance *= self._growth(values, force) ** 2
+        at_zero = points.kind == 2
+        if at_zero.any():
             slope = self.guide.slope if self.guide.slope is not None else np.zeros(len(points))
             length = self.model.setting.geometry.L0 if self.model.setting else 1.0
-            variance[:, free] += (values[CONTRACTION_SD] * length * slope[free]) ** 2
+            variance[:, at_zero] += (values[CONTRACTION_SD] * length * slope[at_zero]) ** 2
         residual = np.broadcast_to(points.force - terms.fixed, (B, len(points)))
         seen = ~points.censored
         if points.censored.any():
@@ -225,7 +301,15 @@ class Collapsed:
                     np.sqrt(variance[:, rows]),
                 )
             )
-        return _white_piece(design[:, seen], residual[:, seen], variance[:, seen])
+        if FREEDOM not in values:
+            return _white_piece(design[:, seen], residual[:, seen], variance[:, seen])
+        scale = np.sqrt(variance[:, seen])
+        noise = None if self.guide.point_noise is None else self.guide.point_noise[seen]
+        sites = Sites.at(noise, scale, values[FREEDOM][:, 0])
+        spread = variance[:, seen] * sites.spread
+        residual = residual[:, seen] - scale * sites.shift
+        free.append(FreeRows(design[:, seen] / spread[..., None], residual / spread, scale, sites))
+        return _white_piece(design[:, seen], residual, spread)
 
     def _tensile(self, values: Values, tensile: TensilePoints) -> Piece:
         model = self.model.tensile
@@ -242,22 +326,6 @@ class Collapsed:
         return _white_piece(design, residual, values[NOISE] ** 2 / tensile.count)
 
 
-def _solve(matrix: Array, right: Array) -> Array:
-    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0], dtype=np.float64)
-
-
-def _cholesky(matrix: Array) -> Array:
-    """Cholesky factors; nan for a matrix that rounding has made indefinite (its density counts as 0)."""
-    try:
-        return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
-    except np.linalg.LinAlgError:
-        factor = np.full_like(matrix, np.nan)
-        for index in np.ndindex(matrix.shape[:-2]):
-            with contextlib.suppress(np.linalg.LinAlgError):
-                factor[index] = np.linalg.cholesky(matrix[index])
-        return factor
-
-
 def _white_piece(design: Array, residual: Array, variance: Array) -> Piece:
     weighted = design / variance[..., None]
     gram = np.swapaxes(design, 1, 2) @ weighted
@@ -266,15 +334,19 @@ def _white_piece(design: Array, residual: Array, variance: Array) -> Piece:
     return Piece(gram, pull, constant)
 
 
-def _segment_piece(covariance: Array, kind: NDArray[np.int64], padded: Array, rows: int) -> Piece:
-    """Correlated segments: covariance (B, K, m, m), kind (S,), [A r] padded (B, S, m, k + 1)."""
-    B, S, m, width = padded.shape
-    factor = _cholesky(covariance)
-    log_dets = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=2, axis2=3)), axis=2)
+def _segment_piece(
+    covariance: Array, kind: NDArray[np.int64], padded: Array, rows: int
+) -> tuple[Piece, Array]:
+    """Correlated segments: covariance (B, K, m, m), kind (S,), [A r] padded (B, S·m, k + 1); C⁻¹[A r]."""
+    B, _, width = padded.shape
+    m = covariance.shape[-1]
+    log_dets = log_determinant(cholesky(covariance))
     log_det = log_dets @ np.bincount(kind, minlength=covariance.shape[1])
-    weighted = (np.linalg.inv(covariance)[:, kind] @ padded).reshape(B, S * m, width)
-    full = np.swapaxes(padded.reshape(B, S * m, width), 1, 2) @ weighted
-    return Piece(full[:, :-1, :-1], full[:, :-1, -1], full[:, -1, -1] + log_det + rows * LOG_2PI)
+    inverse = np.linalg.inv(covariance)[:, kind]
+    weighted = (inverse @ padded.reshape(B, -1, m, width)).reshape(padded.shape)
+    full = np.swapaxes(padded, 1, 2) @ weighted
+    piece = Piece(full[:, :-1, :-1], full[:, :-1, -1], full[:, -1, -1] + log_det + rows * LOG_2PI)
+    return piece, weighted
 
 
 def _forget(covariance: Array, lost: NDArray[np.bool_]) -> Array:
@@ -282,65 +354,3 @@ def _forget(covariance: Array, lost: NDArray[np.bool_]) -> Array:
     either = lost[:, :, None] | lost[:, None, :]
     eye = np.eye(lost.shape[1])
     return np.where(either, eye * lost[:, :, None], covariance)
-
-
-def _gaussian(constant: Array, pull: Array, mean: Array, factor: Array) -> Array:
-    log_det = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)
-    result: Array = -0.5 * (constant - np.einsum("bk,bk->b", pull, mean) + log_det)
-    return result
-
-
-def _with_slack(gram: Array, pull: Array, constant: Array, parts: list[Slack]) -> tuple[Array, Array, Array]:
-    """Laplace's approximation in η with slack rows: the better of two climbs.
-
-    A slack row says ln((1 − ε) Φ((floor − f − Aη)/sd) + ε). One climb starts from all other rows' fit,
-    where a wrong flag is left aside at once; the other takes all flags at their word first.
-    """
-    whole = Slack(*(np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True)))
-    start = _solve(gram, pull)
-    trusting = _climb(gram, pull, whole, start, 0.0)
-    ends = [_climb(gram, pull, whole, first, WRONG_FLAG) for first in (start, trusting)]
-    found = [_laplace(gram, pull, constant, whole, eta) for eta in ends]
-    value, mean, factor = found[0]
-    better = found[1][0] > value
-    return (
-        np.where(better, found[1][0], value),
-        np.where(better[:, None], found[1][1], mean),
-        np.where(better[:, None, None], found[1][2], factor),
-    )
-
-
-def _slack_terms(slack: Slack, eta: Array, wrong: float) -> tuple[Array, Array, Array]:
-    """Sum of the rows' log probabilities (B,), their slopes and (clipped) curvatures in force (B, n)."""
-    z = (slack.floor - slack.fixed - np.einsum("bnk,bk->bn", slack.columns, eta)) / slack.sd
-    log_cdf = special.log_ndtr(z) + np.log1p(-wrong)
-    # φ/Φ by the scaled error function: both underflow far from the floor.
-    ratio = np.sqrt(2.0 / np.pi) / special.erfcx(-z / np.sqrt(2.0))
-    log_term = np.logaddexp(log_cdf, np.log(wrong)) if wrong else log_cdf
-    share = np.exp(log_cdf - log_term)
-    curvature = share * ratio * (z + ratio) - share * (1.0 - share) * ratio**2
-    return log_term.sum(axis=1), share * ratio / slack.sd, np.clip(curvature, 0.0, 1.0) / slack.sd**2
-
-
-def _climb(gram: Array, pull: Array, slack: Slack, eta: Array, wrong: float) -> Array:
-    for _ in range(NEWTON_STEPS):
-        _, slope, curvature = _slack_terms(slack, eta, wrong)
-        gradient = pull - np.einsum("bkl,bl->bk", gram, eta) - np.einsum("bnk,bn->bk", slack.columns, slope)
-        eta = eta + _solve(_slack_hessian(gram, slack, curvature), gradient)
-    return eta
-
-
-def _slack_hessian(gram: Array, slack: Slack, curvature: Array) -> Array:
-    result: Array = gram + np.swapaxes(slack.columns, 1, 2) @ (slack.columns * curvature[..., None])
-    return result
-
-
-def _laplace(
-    gram: Array, pull: Array, constant: Array, slack: Slack, eta: Array
-) -> tuple[Array, Array, Array]:
-    log_term, _, curvature = _slack_terms(slack, eta, WRONG_FLAG)
-    factor = _cholesky(_slack_hessian(gram, slack, curvature))
-    log_det = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)
-    quadratic = np.einsum("bk,bkl,bl->b", eta, gram, eta) - 2.0 * np.einsum("bk,bk->b", pull, eta)
-    value: Array = log_term - 0.5 * (constant + quadratic + log_det)
-    return value, eta, factor

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mpam_calib.posterior.effective import autocorrelation_time, ess_bulk, ess_tail, rhat
+
 Array = NDArray[np.float64]
 
 RHAT_LIMIT = 1.01
@@ -42,28 +44,16 @@ def diagnose_chains(chains: Array) -> Diagnostics:
     R-hat over walkers would be content with all of them in a wrong mode. ESS is the smaller of
     ArviZ's with each walker a chain (time must not be interleaved) and emcee's N/τ.
     """
-    import arviz as az
-
     E, T, W, d = chains.shape
-    rhat, bulk, tail = np.empty(d), np.empty(d), np.empty(d)
+    between, bulk, tail = np.empty(d), np.empty(d), np.empty(d)
     for i in range(d):
         x = chains[..., i]
-        rhat[i] = az.rhat(x.reshape(E, T * W))
+        between[i] = rhat(x.reshape(E, T * W))
         separate = np.moveaxis(x, 2, 1).reshape(E * W, T)
         total = float(E * T * W)
         # A block that is shorter than τ cannot show it; τ is at least what the ensembles show apart.
-        tau = max(_autocorrelation_time(x[e]) for e in range(E))
+        tau = max(autocorrelation_time(x[e].T) for e in range(E))
         limit = total / max(tau, 1.0)
-        bulk[i] = min(float(az.ess(separate, method="bulk")), limit)
-        tail[i] = min(float(az.ess(separate, method="tail")), limit)
-    return Diagnostics(rhat, bulk, tail)
-
-
-def _autocorrelation_time(x: Array) -> float:
-    """emcee's τ of one ensemble's series (steps, walkers); a walker that never moved counts as one draw."""
-    from emcee.autocorr import integrated_time
-
-    moved = np.ptp(x, axis=0) > 0.0
-    share = float(moved.mean())
-    tau = float(integrated_time(x[:, moved, None], quiet=True, tol=0)[0]) if moved.any() else 0.0
-    return share * tau + (1.0 - share) * len(x)
+        bulk[i] = min(ess_bulk(separate), limit)
+        tail[i] = min(ess_tail(separate), limit)
+    return Diagnostics(between, bulk, tail)

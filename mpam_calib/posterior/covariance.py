@@ -87,6 +87,39 @@ class StrokeCovariance:
         result[:, :, np.arange(m), np.arange(m)] += np.where(pad, 1.0, diagonal)
         return np.asarray(result)
 
+    @cached_property
+    def place(self) -> NDArray[np.int64] | slice:
+        """Where each bin stands in the flattened layout (n,); all of it where no place is empty."""
+        seen = np.flatnonzero(~self.pad)
+        if len(seen) == self.pad.size and np.array_equal(self.index.ravel(), seen):
+            return slice(None)
+        result = np.empty(len(seen), dtype=np.int64)
+        result[self.index.ravel()[seen]] = seen
+        return result
+
+    def rows_of(self, bins: LoopBins) -> Array:
+        """Rows (n,) behind each bin, as its kind has them."""
+        return np.asarray(self.rows[self.kind[bins.segment], bins.position])
+
+    def of_each(
+        self, white: Array, correlated: Array, time: Array, rough: Array, grown: Array, spread: Array
+    ) -> Array:
+        """Covariance (B, S, m, m) of every stroke where noise differs from bin to bin; as :meth:`matrix`.
+
+        ``grown`` (B or 1, n) multiplies the sd of all noise of a bin, ``spread`` (B, n) the variance of its
+        white part.
+        """
+        noise = self.matrix(white, correlated, time, np.zeros_like(rough))[:, self.kind]
+        m = self.pad.shape[1]
+        seen = ~self.pad
+        extra = white[:, None, None] ** 2 / (self.rows * self.averaged)[self.kind]
+        extra = extra * (spread[:, self.index] - 1.0)
+        noise[:, :, np.arange(m), np.arange(m)] += np.where(seen, extra, 0.0)
+        scale = np.where(seen, grown[:, self.index], 1.0)
+        noise *= scale[:, :, :, None] * scale[:, :, None, :]
+        result: Array = noise + rough[:, None, None, None] ** 2 * self.rough[self.kind]
+        return result
+
 
 def _kinds(
     pad: NDArray[np.bool_], rows: Array, rough: Array, lag: Array, dt: Array
@@ -111,16 +144,24 @@ def _kinds(
     return np.array(first), kind
 
 
-def fast_noise_log_likelihood(
+def fast_noise_covariance(
     scatter: tuple[Array, int, Array, float], averaged: int, white: Array, correlated: Array, time: Array
 ) -> Array:
-    """Log-likelihood (B,) of the scatter inside bins under white + AR(1) noise."""
-    total, chunks, contrast, dt = scatter
+    """Covariance (B, dof, dof), N², of a chunk's detrended residuals under white + AR(1) noise."""
+    _, _, contrast, dt = scatter
     size = contrast.shape[0]
     lags = np.abs(np.subtract.outer(np.arange(size), np.arange(size)))
     covariance = correlated[:, None, None] ** 2 * np.exp(-lags * dt / time[:, None, None])
     covariance = covariance + white[:, None, None] ** 2 / averaged * np.eye(size)
-    projected = contrast.T @ covariance @ contrast
+    return np.asarray(contrast.T @ covariance @ contrast)
+
+
+def fast_noise_log_likelihood(
+    scatter: tuple[Array, int, Array, float], averaged: int, white: Array, correlated: Array, time: Array
+) -> Array:
+    """Log-likelihood (B,) of the scatter inside bins under white + AR(1) noise."""
+    total, chunks, contrast, _ = scatter
+    projected = fast_noise_covariance(scatter, averaged, white, correlated, time)
     factor = np.linalg.cholesky(projected)
     log_det = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)
     trace = np.trace(np.linalg.solve(projected, total[None]), axis1=1, axis2=2)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.model import Model
+from mpam_calib.posterior.batch import batch_size
 from mpam_calib.posterior.collapsed import Collapsed
-from mpam_calib.posterior.mode import BATCH
 from mpam_calib.posterior.sampling import Sampling
 from mpam_calib.units import KPA, si_factor, unit_of
 
@@ -42,17 +42,18 @@ class Draws:
         return Draws(self.u[keep], {k: v[keep] for k, v in self.values.items()}, self.eta[keep], 1)
 
 
-def keep_draws(target: Collapsed, sampling: Sampling, seed: int) -> Draws:
-    """Evenly spaced draws of every ensemble, with η drawn from its exact conditional for each."""
+def keep_draws(target: Collapsed, sampling: Sampling, seed: int, kept: int | None = KEPT) -> Draws:
+    """Evenly spaced draws of every ensemble (None: all), with η drawn from its exact conditional for each."""
     E, T, W, d = sampling.chain.shape
-    keep = np.unique(np.linspace(0, T * W - 1, KEPT).astype(np.int64))
+    keep = np.unique(np.linspace(0, T * W - 1, kept or T * W).astype(np.int64))
     u = sampling.chain.reshape(E, T * W, d)[:, keep].reshape(-1, d)
     rng = np.random.default_rng([seed, 1])
     values = target.model.values(u)
+    size = batch_size(target)
     eta = np.concatenate(
         [
-            target.linear_draws({k: v[i : i + BATCH] for k, v in values.items()}, rng)
-            for i in range(0, len(u), BATCH)
+            target.linear_draws({k: v[i : i + size] for k, v in values.items()}, rng)
+            for i in range(0, len(u), size)
         ]
     )
     return Draws(u, values, eta, E)

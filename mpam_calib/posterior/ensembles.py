@@ -17,6 +17,9 @@ from mpam_calib.posterior.proposal import IndependenceMove, StudentMixture
 
 Array = NDArray[np.float64]
 
+INDEPENDENT = 0.9
+"""Share of steps that propose from the fitted mixture; the others find their way where it does not fit."""
+
 
 @dataclass(frozen=True)
 class EnsembleState:
@@ -43,10 +46,10 @@ def advance(task: tuple[EnsembleState, StudentMixture, int]) -> Block:
     target = held_target()
     walkers, d = state.coords.shape
     moves = [
-        (IndependenceMove(mixture), 0.6),
-        (DEMove(), 0.25),
-        (DESnookerMove(), 0.05),
-        (StretchMove(), 0.1),
+        (IndependenceMove(mixture), INDEPENDENT),
+        (DEMove(), 0.6 * (1.0 - INDEPENDENT)),
+        (DESnookerMove(), 0.1 * (1.0 - INDEPENDENT)),
+        (StretchMove(), 0.3 * (1.0 - INDEPENDENT)),
     ]
     sampler = EnsembleSampler(walkers, d, lambda u: evaluate(target, u), moves=moves, vectorize=True)
     start = State(state.coords, log_prob=state.log_prob, random_state=state.random)

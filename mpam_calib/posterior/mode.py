@@ -12,6 +12,7 @@ from scipy import optimize
 from mpam_calib.model.noise import WHITE
 from mpam_calib.model.remainder import SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
+from mpam_calib.posterior.batch import batch_size
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.pool import held_target, workers
 
@@ -19,7 +20,7 @@ Array = NDArray[np.float64]
 
 GRADIENT_STEP = 2e-5
 BATCH = 16
-"""Parameter vectors evaluated at once: bounds the memory."""
+"""Points of any other density evaluated at once."""
 HOPELESS = 15.0
 """Nats below the best at which a climb has got stuck rather than found a mode."""
 LOOSEST = 0.2
@@ -50,7 +51,8 @@ class Mode:
 
 def evaluate(target: Density, u: Array) -> Array:
     """Log posterior (n,) in batches."""
-    parts = [target.log_posterior(u[i : i + BATCH]) for i in range(0, len(u), BATCH)]
+    size = batch_size(target) if isinstance(target, Collapsed) else BATCH
+    parts = [target.log_posterior(u[i : i + size]) for i in range(0, len(u), size)]
     return np.concatenate(parts)
 
 

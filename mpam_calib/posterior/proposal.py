@@ -11,25 +11,32 @@ from scipy import special
 
 Array = NDArray[np.float64]
 
-FREEDOM = 6.0
+FREEDOM = 8.0
 """Degrees of freedom: heavier tails than any posterior here, so that no tail is left out."""
+EM_ROUNDS = 25
+PULL = 0.02
+"""Share of all draws that counts towards each component."""
 
 
 @dataclass(frozen=True)
 class StudentMixture:
-    """Equal-weight mixture: ``means`` (K, d) and Cholesky factors ``roots`` (K, d, d)."""
+    """``means`` (K, d), Cholesky factors ``roots`` (K, d, d) and ``shares`` (K,) that add up to one."""
 
     means: Array
     roots: Array
+    shares: Array
 
     @staticmethod
-    def build(means: list[Array], covariances: list[Array]) -> StudentMixture:
-        """From means (d,) and covariances (d, d)."""
-        return StudentMixture(np.stack(means), np.linalg.cholesky(np.stack(covariances)))
+    def build(means: list[Array], covariances: list[Array], shares: Array | None = None) -> StudentMixture:
+        """From means (d,), covariances (d, d) and shares, equal where they are not given."""
+        weights = np.ones(len(means)) if shares is None else shares
+        return StudentMixture(
+            np.stack(means), np.linalg.cholesky(np.stack(covariances)), weights / weights.sum()
+        )
 
     def draw(self, n: int, rng: np.random.RandomState, widen: float = 1.0) -> Array:
         """n points (n, d); ``widen`` multiplies the scale."""
-        which = rng.randint(len(self.means), size=n)
+        which = rng.choice(len(self.means), size=n, p=self.shares)
         d = self.means.shape[1]
         z = rng.standard_normal((n, d)) / np.sqrt(rng.chisquare(FREEDOM, size=(n, 1)) / FREEDOM)
         return np.asarray(self.means[which] + widen * np.einsum("nij,nj->ni", self.roots[which], z))
@@ -47,8 +54,43 @@ class StudentMixture:
             - d / 2 * np.log(FREEDOM * np.pi)
         )
         each = norm - log_det - (FREEDOM + d) / 2 * np.log1p(square / FREEDOM)
-        result: Array = special.logsumexp(each, axis=1) - np.log(len(self.means))
+        result: Array = special.logsumexp(each + np.log(self.shares), axis=1)
         return result
+
+
+def fit_normals(x: Array, weight: Array, count: int) -> tuple[list[Array], list[Array], Array]:
+    """Means, covariances and shares of ``count`` normal densities that together fit weighted draws (n, d).
+
+    Expectation-maximisation, begun along the axis on which the draws are most askew. Each covariance is
+    drawn a little to that of all draws, so that none collapses.
+    """
+    centre = weight @ x
+    whole = (x - centre).T @ ((x - centre) * weight[:, None]) + 1e-10 * np.eye(x.shape[1])
+    if count == 1:
+        return [centre], [whole], np.ones(1)
+    root = np.linalg.cholesky(whole)
+    white = np.linalg.solve(root, (x - centre).T).T
+    skew = weight @ white**3
+    axis = skew / max(float(np.linalg.norm(skew)), 1e-300)
+    along = white @ axis
+    order = np.argsort(along)
+    start = np.interp((np.arange(count) + 0.5) / count, np.cumsum(weight[order]), along[order])
+    means = centre + start[:, None] * (root @ axis)
+    covariances = np.repeat(whole[None], count, axis=0)
+    shares = np.full(count, 1.0 / count)
+    for _ in range(EM_ROUNDS):
+        roots = np.linalg.cholesky(covariances)
+        z = np.linalg.solve(roots, np.swapaxes(x - means[:, None], 1, 2))
+        log_det = np.sum(np.log(np.diagonal(roots, axis1=1, axis2=2)), axis=1)
+        log = np.log(shares)[:, None] - log_det[:, None] - 0.5 * np.sum(z**2, axis=1)
+        own = weight * special.softmax(log, axis=0)
+        shares = own.sum(axis=1)
+        means = (own @ x + PULL * centre) / (shares + PULL)[:, None]
+        delta = x - means[:, None]
+        spread = np.swapaxes(delta, 1, 2) @ (delta * own[..., None])
+        covariances = (spread + PULL * whole) / (shares + PULL)[:, None, None]
+        shares = (shares + PULL) / (1.0 + count * PULL)
+    return list(means), list(covariances), shares
 
 
 class IndependenceMove(MHMove):  # type: ignore[misc]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mpam_calib.posterior.batch import batch_size
 from mpam_calib.posterior.checkpoint import Checkpoint
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.convergence import ESS_WANTED, Diagnostics, diagnose_chains
@@ -21,6 +22,8 @@ Array = NDArray[np.float64]
 
 ENSEMBLES = 4
 BLOCK = 40
+PATIENCE = 1.2
+"""Factor by which the draws must grow before they are looked at again: a look costs as much as they do."""
 MAX_STEPS = 4000
 """Default budget of steps that count, for each ensemble."""
 
@@ -56,9 +59,9 @@ class Sampling:
         return self.diagnostics.converged
 
 
-def walkers_for(dimensions: int) -> int:
-    """Walkers of one ensemble: even, and several times the dimension."""
-    return max(32, 4 * dimensions)
+def walkers_for(target: Collapsed) -> int:
+    """Walkers of one ensemble: even, and several times the dimension; more where many cost hardly more."""
+    return max(32, batch_size(target) // 2 * 2, 4 * len(target.model.names))
 
 
 def sample(
@@ -87,7 +90,7 @@ def sample(
         warm: WarmUp | None = checkpoint.load("warm_up") if checkpoint else None
         if warm is None:
             tell(Progress("warming up", 0, float("nan"), 0.0, 0.0))
-            walkers = walkers_for(len(modes[0].u))
+            walkers = walkers_for(target)
             warm = warm_up(
                 target,
                 modes,
@@ -99,6 +102,7 @@ def sample(
             if checkpoint:
                 checkpoint.save("warm_up", warm)
         states = warm.states
+        steps = checked = 0
         while True:
             name = f"block_{len(blocks):05d}"
             block: list[Block] | None = checkpoint.load(name) if checkpoint else None
@@ -108,9 +112,12 @@ def sample(
                     checkpoint.save(name, block)
             states = [b.state for b in block]
             blocks.append(block)
+            steps += len(block[0].chain)
+            if steps < checked * PATIENCE and steps + BLOCK <= max_steps:
+                continue
             chain = np.concatenate([np.stack([b.chain for b in part]) for part in blocks], axis=1)
             figures = diagnose_chains(chain)
-            steps = chain.shape[1]
+            checked = steps
             ess = float(min(figures.ess_bulk.min(), figures.ess_tail.min()))
             tell(Progress("sampling", steps, float(figures.rhat.max()), ess, min(ess / ess_wanted, 1.0)))
             enough = figures.meets(ess_wanted)

@@ -7,6 +7,7 @@ import pandas as pd
 
 from mpam_calib.posterior.convergence import RHAT_LIMIT
 from mpam_calib.posterior.draws import Reported
+from mpam_calib.posterior.effective import ess_bulk, ess_tail, rhat
 from mpam_calib.posterior.sampling import Sampling
 
 COLUMNS = [
@@ -31,8 +32,6 @@ def summarise(listed: list[Reported], names: tuple[str, ...], sampling: Sampling
     (coefficients, z) is assessed on these, each ensemble one chain, and never credited with more
     than the worst sampled parameter allows R-hat to hide.
     """
-    import arviz as az
-
     chains = sampling.chain.shape[0]
     figures = sampling.diagnostics
     rows = []
@@ -45,9 +44,9 @@ def summarise(listed: list[Reported], names: tuple[str, ...], sampling: Sampling
             split = x.reshape(chains, -1)
             flat = np.ptp(split) == 0.0
             state = (
-                1.0 if flat else float(az.rhat(split)),
-                float(x.size) if flat else float(az.ess(split, method="bulk")),
-                float(x.size) if flat else float(az.ess(split, method="tail")),
+                1.0 if flat else rhat(split),
+                float(x.size) if flat else ess_bulk(split),
+                float(x.size) if flat else ess_tail(split),
             )
         q05, q50, q95 = np.quantile(x, [0.05, 0.5, 0.95])
         rows.append([item.name, item.unit, x.mean(), x.std(ddof=1), q05, q50, q95, item.prior_sd, *state])

@@ -1,8 +1,9 @@
 """Warm-up: fit the independence proposal to the posterior before the draws that count.
 
 Laplace's covariance at the modes starts it; weighted draws from it refit it (adaptive importance
-sampling). Where too few of them carry weight, rounds of the ensembles themselves refit it, climbing
-again from any walker that found a better place. A last round lets the over-dispersed starts settle.
+sampling), with a few components for a posterior that is askew. Where too few of them carry weight, rounds
+of the ensembles themselves refit it, climbing again from any walker that found a better place. A last round
+lets the over-dispersed starts settle.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.ensembles import Block, EnsembleState
 from mpam_calib.posterior.mode import Mode, climb, curvature
-from mpam_calib.posterior.proposal import StudentMixture
+from mpam_calib.posterior.proposal import StudentMixture, fit_normals
 
 Array = NDArray[np.float64]
 
@@ -24,8 +25,11 @@ INFLATION = 1.15
 RELEVANT = 8.0
 """Modes whose evidence is further below the best (nats) get no component of their own."""
 WEIGHTED_ROUNDS, WEIGHTED_DRAWS = 4, 1000
-GOOD_SHARE, POOR_SHARE = 0.5, 0.1
+GOOD_SHARE, POOR_SHARE = 0.7, 0.1
 """Effective share of weighted draws at which the proposal is good; or so poor that walkers must help."""
+COMPONENTS = 3
+MODES_SHARE = 0.1
+"""Share of the proposal that stays with the modes, whatever was drawn."""
 WALKER_ROUNDS, STEPS = 5, 25
 ENOUGH = 0.3
 """Accepted share at which walkers have fitted the proposal well enough."""
@@ -57,11 +61,15 @@ def laplace_mixture(modes: list[Mode]) -> StudentMixture:
     return StudentMixture.build(*_components(modes))
 
 
-def _with_fit(modes: list[Mode], mean: Array, covariance: Array) -> StudentMixture:
-    """The modes' curvature, and (twice) what was drawn."""
+def _with_fit(modes: list[Mode], x: Array, weight: Array) -> StudentMixture:
+    """What was drawn (n, d), and a little of the modes' curvature."""
+    effective = 1.0 / float(np.sum(weight**2))
+    count = COMPONENTS if effective > 20 * COMPONENTS * x.shape[1] else 1
     means, covariances = _components(modes)
-    fitted = INFLATION**2 * covariance + 1e-10 * np.eye(len(mean))
-    return StudentMixture.build([*means, mean, mean], [*covariances, fitted, fitted])
+    fitted = fit_normals(x, weight, count)
+    of_modes = np.full(len(means), MODES_SHARE / len(means))
+    shares = np.concatenate([of_modes, (1.0 - MODES_SHARE) * fitted[2]])
+    return StudentMixture.build([*means, *fitted[0]], [*covariances, *fitted[1]], shares)
 
 
 def _weigh(modes: list[Mode], evaluate: Evaluate, seed: int) -> tuple[StudentMixture, list[float]]:
@@ -77,8 +85,7 @@ def _weigh(modes: list[Mode], evaluate: Evaluate, seed: int) -> tuple[StudentMix
         shares.append(effective / WEIGHTED_DRAWS)
         if shares[-1] >= GOOD_SHARE or effective < 5 * x.shape[1]:
             break
-        mean = weight @ x
-        mixture = _with_fit(modes, mean, (x - mean).T @ ((x - mean) * weight[:, None]))
+        mixture = _with_fit(modes, x, weight)
     return mixture, shares
 
 
@@ -119,5 +126,5 @@ def warm_up(
             drawn = np.concatenate(
                 [b.chain[len(b.chain) // 2 :].reshape(-1, b.chain.shape[2]) for b in blocks]
             )
-            mixture = _with_fit(modes, drawn.mean(axis=0), np.atleast_2d(np.cov(drawn.T)))
+            mixture = _with_fit(modes, drawn, np.full(len(drawn), 1.0 / len(drawn)))
     return WarmUp(states, mixture, modes, accepted)

@@ -48,11 +48,7 @@ def muscle_bands(model: Model, draws: Draws, pressures: Array, seed: int, trim: 
     limit = reach.at(pressures)
     parts = []
     for observed in (False, True):
-        noise = (
-            curves.noise[:, None, None] * rng.standard_normal(curves.force[:, :, 0].shape)
-            if observed
-            else 0.0
-        )
+        noise = curves.noise.draw(curves.force[:, :, 2], rng) if observed else 0.0
         suffix = "_observed" if observed else ""
         for j, branch in enumerate(BRANCHES):
             far = grid[None, :] > limit[:, None] * 1.02 + 1e-3
@@ -66,9 +62,7 @@ def muscle_bands(model: Model, draws: Draws, pressures: Array, seed: int, trim: 
         contraction = free
         if observed:
             # The cell's noise moves the point where the force is read as zero.
-            shifted = curves.force[:, :, 2] + curves.noise[:, None, None] * rng.standard_normal(
-                (*free.shape, 1)
-            )
+            shifted = curves.force[:, :, 2] + curves.noise.draw(np.zeros((*free.shape, 1)), rng)
             own = curves.contraction_noise[:, None] * rng.standard_normal(free.shape)
             contraction = np.maximum(first_root(grid, shifted) + own, 0.0)
         table = _table(f"free_contraction{suffix}", pressures, np.zeros(1), "", contraction[:, :, None])
@@ -84,7 +78,7 @@ def _blocked(
 ) -> pd.DataFrame:
     blocked = curves.force[:, :, 2, 0]
     if suffix:
-        blocked = blocked + curves.noise[:, None] * rng.standard_normal(blocked.shape)
+        blocked = blocked + curves.noise.draw(blocked, rng)
     table = _table(f"blocked_force_N{suffix}", curves.pressures, np.zeros(1), "", blocked[:, :, None])
     table["extrapolated"] = outside
     return table

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.model import CONTRACTION_SD, Model
-from mpam_calib.model.noise import CORRELATED, WHITE
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.reference import geometric_contraction
 from mpam_calib.model.remainder import ROUGH
 from mpam_calib.posterior.covariance import ROUGH_LENGTH
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.posterior.target import predict_force
+from mpam_calib.prediction.reading_noise import ReadingNoise
 
 Array = NDArray[np.float64]
 
@@ -30,13 +30,13 @@ LIMIT = 0.6
 class Curves:
     """Force draws, N: ``force`` (N, pressures, 3 branches, contractions), in the order of BRANCHES.
 
-    ``noise`` (N,) and ``contraction_noise`` (N,) are the sds of one new reading.
+    ``noise`` (what a new reading adds) and ``contraction_noise`` (N,), its sd.
     """
 
     pressures: Array
     contractions: Array
     force: Array
-    noise: Array
+    noise: ReadingNoise
     contraction_noise: Array
 
 
@@ -68,10 +68,9 @@ def force_curves(model: Model, draws: Draws, pressures: Array, contractions: Arr
     if ROUGH in draws.values:
         force = force + _stroke_remainder(model, draws, contractions, shape, rng)
     zero = np.zeros(len(draws))
-    white = draws.values[WHITE][:, 0]
-    correlated = draws.values[CORRELATED][:, 0] if CORRELATED in draws.values else zero
     own = draws.values[CONTRACTION_SD][:, 0] if CONTRACTION_SD in draws.values else zero
-    return Curves(pressures, contractions, force, np.hypot(white, correlated), own)
+    noise = ReadingNoise(draws.values, model.setting.force_scale)
+    return Curves(pressures, contractions, force, noise, own)
 
 
 def _stroke_remainder(

@@ -12,7 +12,7 @@ from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Blueprint, draw_blueprint
 from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.model.model import Model, build_model
-from mpam_calib.model.noise import CORRELATED, TIME, WHITE
+from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.bins import row_readings
 from mpam_calib.posterior.target import build_target, locate
@@ -74,7 +74,9 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
         loops = _protocol(model, values, eta)
     if loops is not None:
         force = model.chain.force(values, eta, row_readings(loops))[0]
-        loops = _record(loops, force, values, specimen.sensors.force_floor_N, rng)
+        assert model.setting is not None
+        floor = specimen.sensors.force_floor_N
+        loops = _record(loops, force, values, model.setting.force_scale, floor, rng)
     if grid is not None:
         grid = _record_map(model, grid, values, eta, specimen, rng)
     result = replace(
@@ -147,25 +149,41 @@ def _protocol(model: Model, values: dict[str, Array], eta: Array) -> Loops:
     return thesis_protocol(np.array(free), L0)
 
 
-def _noise(count: int, dt: float, values: dict[str, Array], rng: np.random.Generator) -> Array:
-    """White noise and an AR(1) part, N."""
+def _noise(
+    force: Array, dt: float | None, values: dict[str, Array], scale: float, rng: np.random.Generator
+) -> Array:
+    """White noise (Student-t where that is declared) and an AR(1) part, N; without a clock the former alone.
+
+    Both grow with the force (n,) over ``scale`` (N) where that is declared.
+    """
+    count = len(force)
     noise = values[WHITE][0, 0] * rng.standard_normal(count)
-    if CORRELATED in values:
+    if FREEDOM in values:
+        dof = values[FREEDOM][0, 0]
+        noise = noise / np.sqrt(rng.chisquare(dof, count) / dof)
+    if dt is not None and CORRELATED in values:
         from scipy.signal import lfilter
 
         rho = float(np.exp(-dt / values[TIME][0, 0]))
         shocks = rng.standard_normal(count) * np.sqrt(1.0 - rho**2)
         shocks[0] = rng.standard_normal()
         noise = noise + values[CORRELATED][0, 0] * lfilter([1.0], [1.0, -rho], shocks)
+    if GROWTH in values:
+        noise = noise * grown(values[GROWTH][0, 0], force, scale)
     return np.asarray(noise)
 
 
 def _record(
-    loops: Loops, force: Array, values: dict[str, Array], floor: float | None, rng: np.random.Generator
+    loops: Loops,
+    force: Array,
+    values: dict[str, Array],
+    scale: float,
+    floor: float | None,
+    rng: np.random.Generator,
 ) -> Loops:
     dt = float(np.median(np.diff(loops.time_s)))
     held = force if floor is None else np.maximum(force, floor)
-    reading = held + _noise(len(force), dt, values, rng)
+    reading = held + _noise(held, dt, values, scale, rng)
     censored = np.zeros(len(force), dtype=bool) if floor is None else reading <= floor
     return replace(loops, force_N=reading, censored=censored)
 
@@ -186,5 +204,6 @@ def _record_map(
     floor = specimen.sensors.force_floor_N
     slack = np.zeros(len(force), dtype=bool) if floor is None else force <= floor
     held = force if floor is None else np.maximum(force, floor)
-    reading = held + values[WHITE][0, 0] * rng.standard_normal(len(force))
+    assert model.setting is not None
+    reading = held + _noise(held, None, values, model.setting.force_scale, rng)
     return replace(grid, force_N=np.where(slack, held, reading), censored=slack)

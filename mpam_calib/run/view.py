@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.calibration import Calibration
 from mpam_calib.model.model import CONTRACTION_SD, Model
-from mpam_calib.model.noise import CORRELATED, TIME, WHITE
+from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 DRAWS = 200
 """Draws behind the fitted value of each reading."""
-NOT_PHYSICS = (WHITE, CORRELATED, TIME, SMOOTH, ROUGH, NOISE, MISFIT, CONTRACTION_SD)
+NOT_PHYSICS = (WHITE, CORRELATED, TIME, GROWTH, FREEDOM, SMOOTH, ROUGH, NOISE, MISFIT, CONTRACTION_SD)
 BRANCH_WORDS = {1: "loading", -1: "unloading", 0: ""}
 PROVENANCE = {
     "reconstructed": "These data are reconstructed from printed tables, not measured.",
@@ -158,12 +158,19 @@ def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
         frame["stroke"] = data.bins.segment
         frame["time_s"] = middle.time
         frame["cycle"] = middle.cycle
-        frames.append(_close(frame, fitted, np.sqrt(parameter_sd**2 + left + rough + _noise(draws) ** 2)))
+        frames.append(
+            _close(
+                frame,
+                fitted,
+                np.sqrt(parameter_sd**2 + left + rough + _noise_square(calibration, draws, fitted)),
+            )
+        )
         squares.append((left + rough)[~data.bins.slack])
     if data.points is not None:
         readings = data.points.readings
         fitted, parameter_sd, left = _fit(calibration, draws, readings)
-        sd = np.sqrt(parameter_sd**2 + left + float(np.mean(draws.values[WHITE] ** 2)))
+        own = _noise_square(calibration, draws, fitted, clock=False)
+        sd = np.sqrt(parameter_sd**2 + left + own)
         for number, kind in enumerate(KINDS):
             rows = data.points.kind == number
             if not rows.any():
@@ -177,8 +184,8 @@ def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
                 # Newtons to contraction along the curve's slope there.
                 slope = calibration.target.guide.slope[rows] * model.setting.geometry.L0
                 frame["fitted_N"] = frame["contraction"] - fitted[rows] / slope
-                own = float(np.mean(draws.values[CONTRACTION_SD] ** 2))
-                frame["sd_N"] = np.sqrt((sd[rows] / slope) ** 2 + own)
+                length = float(np.mean(draws.values[CONTRACTION_SD] ** 2))
+                frame["sd_N"] = np.sqrt((sd[rows] / slope) ** 2 + length)
             frames.append(frame)
             squares.append(left[rows & ~data.points.censored])
     if data.tensile is not None and model.tensile is not None:
@@ -196,10 +203,22 @@ def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
 
 
 def _noise(draws: Draws) -> float:
+    """Noise (N) of a reading at small forces; of heavy-tailed noise, its scale."""
     square = draws.values[WHITE] ** 2
     if CORRELATED in draws.values:
         square = square + draws.values[CORRELATED] ** 2
     return float(np.sqrt(np.mean(square)))
+
+
+def _noise_square(calibration: Calibration, draws: Draws, force: Array, clock: bool = True) -> Array | float:
+    """Mean square (N²) of a reading's noise at forces (n,); without a clock its white part alone."""
+    square = draws.values[WHITE] ** 2
+    if clock and CORRELATED in draws.values:
+        square = square + draws.values[CORRELATED] ** 2
+    setting = calibration.model.setting
+    if GROWTH not in draws.values or setting is None:
+        return float(np.mean(square))
+    return np.asarray(np.mean(square * grown(draws.values[GROWTH], force, setting.force_scale) ** 2, axis=0))
 
 
 def _fit(calibration: Calibration, draws: Draws, readings: Readings) -> tuple[Array, Array, Array]:

@@ -122,6 +122,15 @@ class Sensors(Table):
         return self.pressure_bias_sd_kPa * KPA
 
 
+class Noise(Table):
+    """What the load cell's noise may do beyond being white and correlated, and of one size."""
+
+    growth: StrictBool = False
+    """Whether it may grow with the force."""
+    robust: StrictBool = False
+    """Whether it may have heavy tails, so that bursts and knocks do not move the curve."""
+
+
 class Simulation(Table):
     """The model to calibrate and to criticise: a declared value."""
 
@@ -244,6 +253,7 @@ class Declaration(Table):
     geometry: Geometry | None = None
     braid: Braid | None = None
     sensors: Sensors = Sensors()
+    noise: Noise = Noise()
     files: Files = Files()
     csv: Csv = Csv()
     columns: Columns = Columns()

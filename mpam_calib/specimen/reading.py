@@ -91,6 +91,7 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
             for kind, counts in rows.items()
             for file, count in zip(of(kind), counts, strict=True)
         ),
+        noise=declaration.noise,
     )
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.specimen.declaration import Braid, Csv, Fit, Geometry, Sensors, Simulation
+from mpam_calib.specimen.declaration import Braid, Csv, Fit, Geometry, Noise, Sensors, Simulation
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -126,6 +126,7 @@ class Specimen:
     digest: str
     notes: tuple[str, ...] = ()
     files: tuple[FileRead, ...] = ()
+    noise: Noise = field(default_factory=Noise)
 
     @property
     def has_muscle_data(self) -> bool:

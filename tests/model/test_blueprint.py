@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from mpam_calib.model.blueprint import Blueprint, MaterialPosterior, Options, draw_blueprint
 from mpam_calib.model.model import build_model
-from mpam_calib.specimen.declaration import Fit, Geometry, GeometrySd, Sensors
+from mpam_calib.specimen.declaration import Fit, Geometry, GeometrySd, Noise, Sensors
 from mpam_calib.specimen.recording import FreeContraction, Tensile
 
 from . import build
@@ -120,3 +120,17 @@ def test_options_leave_out_what_they_name(options, gone):
     full = build_model(build.blueprint({"law": "linear", "order": 2}, **parts))
     less = build_model(build.blueprint({"law": "linear", "order": 2}, options, **parts))
     assert set(full.names) - set(less.names) == gone
+
+
+def test_noise_is_declared() -> None:
+    """Nothing by default; each option of [noise] adds one parameter and survives JSON."""
+    plain = build.blueprint({"law": "linear", "order": 2})
+    before = set(build_model(plain).names)
+    for noise, added in (
+        (Noise(growth=True), {"noise_growth"}),
+        (Noise(robust=True), {"noise_dof"}),
+        (Noise(growth=True, robust=True), {"noise_growth", "noise_dof"}),
+    ):
+        declared = build.blueprint({"law": "linear", "order": 2}, noise=noise)
+        assert Blueprint.model_validate_json(declared.model_dump_json()) == declared
+        assert set(build_model(declared).names) - before == added

@@ -169,16 +169,18 @@ class Twin:
     # --- the recordings -------------------------------------------------------------------------------
 
     def bins(self) -> list[list[int]]:
-        """Row numbers of each bin, stroke after stroke; a new stroke starts a new list of bins."""
+        """Row numbers of each bin, stroke after stroke; with white noise alone every row is one."""
         return [rows for stroke in self.strokes() for rows in stroke]
 
     def strokes(self) -> list[list[list[int]]]:
         assert self.specimen.loops is not None
         number = self.specimen.loops.stroke
+        options = self.blueprint.options
+        every_row = not (options.correlated_noise or options.remainder)
         result = []
         for stroke in dict.fromkeys(number.tolist()):
             rows = [i for i in range(len(number)) if number[i] == stroke]
-            result.append([rows[a:b] for a, b in _cuts(len(rows))])
+            result.append([[i] for i in rows] if every_row else [rows[a:b] for a, b in _cuts(len(rows))])
         return result
 
     def loop_rows(self, loops: Loops, members: list[int]) -> tuple[list[Row], Row]:
@@ -190,7 +192,17 @@ class Twin:
         s, level = float(loops.branch[members[0]]), int(loops.level[members[0]])
         return [Row(P, x - spread, s, level), Row(P, x + spread, s, level)], Row(P, x, s, level)
 
-    def dense(self, theta: Theta, guide_points: Array | None = None, slope: Array | None = None) -> Dense:
+    def grown(self, theta: Theta, force: float) -> float:
+        """Variance of the noise at a force, over that at none."""
+        return 1.0 + (theta.get("noise_growth", 0.0) * force / self.scale) ** 2
+
+    def dense(
+        self,
+        theta: Theta,
+        guide_points: Array | None = None,
+        slope: Array | None = None,
+        guide_bins: Array | None = None,
+    ) -> Dense:
         """The whole Gaussian system for loops, points and tensile test (slack rows are not known here)."""
         y: list[float] = []
         fixed: list[float] = []
@@ -209,7 +221,7 @@ class Twin:
                 fixed.append(0.5 * (ends[0][0] + ends[1][0]))
                 moduli.append([0.5 * (a + b) for a, b in zip(ends[0][1], ends[1][1], strict=True)])
                 rest.append([amplitude * c for c in self.remainder_row(middle)] + [0.0] * waves)
-            blocks.append(self.loops_covariance(theta))
+            blocks.append(self.loops_covariance(theta, guide_bins))
         for number, (row, value, kind) in enumerate(self.points()):
             pulls = 1.0 if guide_points is None else float(np.sign(guide_points[number]))
             here, columns = self.force_row(row, theta, pulls)
@@ -217,7 +229,8 @@ class Twin:
             fixed.append(here)
             moduli.append(columns)
             rest.append([amplitude * c for c in self.remainder_row(row)] + [0.0] * waves)
-            variance = theta["noise_sd_N"] ** 2
+            force = value if guide_points is None else float(guide_points[number])
+            variance = theta["noise_sd_N"] ** 2 * self.grown(theta, force)
             if kind == "free":
                 lean = 0.0 if slope is None else float(slope[number])
                 variance += (theta["contraction_sd"] * self.tube.L0 * lean) ** 2
@@ -277,7 +290,15 @@ class Twin:
 
     # --- noise ----------------------------------------------------------------------------------------
 
-    def loops_covariance(self, theta: Theta) -> Array:
+    def bin_forces(self, guide: Array | None) -> list[float]:
+        """What noise grows by: the mean of the guide's forces at a bin's two Gauss points, or its reading."""
+        assert self.specimen.loops is not None
+        every = self.bins()
+        if guide is not None:
+            return [0.5 * float(guide[i] + guide[i + len(every)]) for i in range(len(every))]
+        return [sum(float(self.specimen.loops.force_N[j]) for j in b) / len(b) for b in every]
+
+    def loops_covariance(self, theta: Theta, guide: Array | None = None) -> Array:
         """Covariance of all bin means: rows' noise averaged pair by pair, and each stroke's own kernel."""
         loops = self.specimen.loops
         assert loops is not None
@@ -287,6 +308,7 @@ class Twin:
         every = self.bins()
         means = [sum(float(loops.displacement_m[i]) for i in b) / len(b) for b in every]
         length = (max(means) - min(means)) / 6.0
+        growth = [math.sqrt(self.grown(theta, force)) for force in self.bin_forces(guide)]
         C = np.zeros((len(every), len(every)))
         place = 0
         for stroke in self.strokes():
@@ -296,17 +318,20 @@ class Twin:
                     total = slow * float(np.mean(np.exp(-gaps / tau))) if slow > 0.0 else 0.0
                     if a == b:
                         total += white / len(first)
+                    total *= growth[place + a] * growth[place + b]
                     total += rough * math.exp(-abs(means[place + a] - means[place + b]) / length)
                     C[place + a, place + b] = total
             place += len(stroke)
         return C
 
-    def scatter(self, theta: Theta) -> float:
+    def scatter(self, theta: Theta, guide: Array | None = None) -> float:
         """Log density of the detrended beginnings of all regular bins (0 where there are too few)."""
         loops = self.specimen.loops
         assert loops is not None
         white = theta["noise_sd_N"] ** 2 / loops.averaged
         slow, tau = theta.get("noise_corr_sd_N", 0.0) ** 2, theta.get("noise_corr_time_s", 1.0)
+        number = {b[0]: i for i, b in enumerate(self.bins())}
+        forces = self.bin_forces(guide)
         regular = [b for stroke in self.strokes() for b in stroke[7:-1] if len(b) >= 4]
         if len(regular) < 8:
             return 0.0
@@ -322,15 +347,22 @@ class Twin:
         for b in regular:
             if len(b) >= size:
                 z = Q.T @ loops.force_N[b[:size]]
+                growth = self.grown(theta, forces[number[b[0]]])
+                z, extra = z / math.sqrt(growth), len(z) * math.log(growth)
+                total -= 0.5 * extra
                 total -= 0.5 * (z @ np.linalg.solve(S, z) + np.linalg.slogdet(S)[1] + len(z) * LOG_2PI)
         return float(total)
 
     def log_likelihood(
-        self, theta: Theta, guide_points: Array | None = None, slope: Array | None = None
+        self,
+        theta: Theta,
+        guide_points: Array | None = None,
+        slope: Array | None = None,
+        guide_bins: Array | None = None,
     ) -> float:
         """ln p(y | θ)."""
-        value = self.dense(theta, guide_points, slope).log_density()
-        return value + (self.scatter(theta) if self.specimen.loops is not None else 0.0)
+        value = self.dense(theta, guide_points, slope, guide_bins).log_density()
+        return value + (self.scatter(theta, guide_bins) if self.specimen.loops is not None else 0.0)
 
 
 def _legendre(degree: int, x: float) -> float:

@@ -8,7 +8,7 @@ from emcee import EnsembleSampler, State
 from emcee.moves import MHMove
 from scipy import integrate, stats
 
-from mpam_calib.posterior.proposal import IndependenceMove, StudentMixture
+from mpam_calib.posterior.proposal import FREEDOM, IndependenceMove, StudentMixture, fit_normals
 
 MEANS = [np.array([0.0, 1.0]), np.array([3.0, -1.0])]
 SPREADS = [np.array([[1.0, 0.6], [0.6, 2.0]]), np.array([[0.3, -0.1], [-0.1, 0.5]])]
@@ -23,13 +23,13 @@ def test_one_component_is_the_multivariate_t():
     made = StudentMixture.build(MEANS[:1], SPREADS[:1])
     x = np.random.default_rng(0).normal(0.0, 4.0, (200, 2))
     assert made.log_density(x) == pytest.approx(
-        stats.multivariate_t(MEANS[0], SPREADS[0], df=6.0).logpdf(x), rel=1e-12
+        stats.multivariate_t(MEANS[0], SPREADS[0], df=FREEDOM).logpdf(x), rel=1e-12
     )
 
 
 def test_two_components_have_equal_weight():
     x = np.random.default_rng(0).normal(0.0, 4.0, (200, 2))
-    parts = [stats.multivariate_t(m, s, df=6.0).pdf(x) for m, s in zip(MEANS, SPREADS, strict=True)]
+    parts = [stats.multivariate_t(m, s, df=FREEDOM).pdf(x) for m, s in zip(MEANS, SPREADS, strict=True)]
     assert np.exp(mixture().log_density(x)) == pytest.approx(0.5 * (parts[0] + parts[1]), rel=1e-12)
 
 
@@ -113,3 +113,33 @@ def test_the_move_finds_the_density_from_elsewhere():
     state = State(start, random_state=np.random.RandomState(9).get_state())
     x = sampler.run_mcmc(state, 150, skip_initial_state_check=True).coords
     assert min(p_values(x)) > 1e-3
+
+
+def test_a_fit_to_weighted_draws_of_a_skewed_density():
+    """Draws of a Gaussian weighted to a skew normal: three components propose better than one."""
+    rng = np.random.default_rng(0)
+    x = np.column_stack([rng.normal(0.5, 1.2, 4000), rng.standard_normal(4000)])
+    skew = stats.skewnorm(4.0)
+
+    def target(x: np.ndarray) -> np.ndarray:
+        return skew.logpdf(x[:, 0]) + stats.norm.logpdf(x[:, 1])
+
+    weight = np.exp(target(x) - stats.norm(0.5, 1.2).logpdf(x[:, 0]) - stats.norm.logpdf(x[:, 1]))
+    weight /= weight.sum()
+    shares = []
+    for count in (1, 3):
+        made = StudentMixture.build(*fit_normals(x, weight, count))
+        assert made.shares.sum() == pytest.approx(1.0)
+        drawn = made.draw(20_000, np.random.RandomState(1))
+        ratio = np.exp(target(drawn) - made.log_density(drawn))
+        shares.append(ratio.mean() ** 2 / np.mean(ratio**2))
+    assert shares[1] > 0.8
+    assert shares[1] > shares[0] + 0.05
+
+
+def test_a_fit_of_one_component_has_the_draws_moments():
+    x = np.random.default_rng(0).standard_normal((300, 3)) @ np.diag([1.0, 2.0, 3.0])
+    means, covariances, shares = fit_normals(x, np.full(300, 1.0 / 300), 1)
+    assert means[0] == pytest.approx(x.mean(axis=0))
+    assert covariances[0] == pytest.approx(np.cov(x.T, bias=True), rel=1e-6)
+    assert shares == pytest.approx([1.0])

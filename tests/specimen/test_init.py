@@ -63,4 +63,5 @@ def test_every_optional_key_of_the_template_is_a_real_one(tmp_path: Path) -> Non
     specimen = read(tmp_path)
     assert specimen.braid is not None and specimen.geometry is not None
     assert specimen.geometry.sd.alpha0_deg == 1.0
+    assert specimen.noise.growth and specimen.noise.robust
     assert specimen.fit.tensile_strain == (0.1, 3.0)

@@ -1,0 +1,51 @@
+"""What a new reading of the load cell adds to the force, for every posterior draw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, WHITE, grown
+
+Array = NDArray[np.float64]
+
+
+FURTHEST = 100.0
+"""Scales of a heavy-tailed noise beyond which nobody would believe a reading."""
+
+
+@dataclass(frozen=True)
+class ReadingNoise:
+    """Noise under N draws: ``values`` name → (N, 1), the force (N) at which a growth of one counts."""
+
+    values: Mapping[str, Array]
+    force_scale: float
+
+    def sd(self, force: Array) -> Array:
+        """Standard deviation (N, ...), N, at forces (N, ...); of heavy-tailed noise, its scale."""
+        white = self._shaped(WHITE, force.ndim)
+        correlated = self._shaped(CORRELATED, force.ndim) if CORRELATED in self.values else 0.0
+        return np.asarray(np.hypot(white, correlated) * self._growth(force))
+
+    def draw(self, force: Array, rng: np.random.Generator) -> Array:
+        """One reading's noise (N, ...), N, at forces (N, ...)."""
+        normal = rng.standard_normal(force.shape)
+        if FREEDOM not in self.values:
+            return self.sd(force) * normal
+        dof = np.broadcast_to(self._shaped(FREEDOM, force.ndim), force.shape)
+        tailed = np.clip(normal / np.sqrt(rng.chisquare(dof) / dof), -FURTHEST, FURTHEST)
+        white = self._shaped(WHITE, force.ndim) * tailed
+        if CORRELATED in self.values:
+            white = white + self._shaped(CORRELATED, force.ndim) * rng.standard_normal(force.shape)
+        return np.asarray(white * self._growth(force))
+
+    def _growth(self, force: Array) -> Array | float:
+        if GROWTH not in self.values:
+            return 1.0
+        return grown(self._shaped(GROWTH, force.ndim), force, self.force_scale)
+
+    def _shaped(self, name: str, dimensions: int) -> Array:
+        return self.values[name].reshape(-1, *(1,) * (dimensions - 1))

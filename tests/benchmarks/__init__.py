@@ -1,0 +1,1 @@
+"""How fast posteriors are drawn, beside other samplers: ``make benchmark``."""

@@ -1,0 +1,39 @@
+"""What a new reading adds: white and correlated, grown with the force, with heavy tails."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from mpam_calib.prediction.reading_noise import FURTHEST, ReadingNoise
+
+N = 40_000
+FORCE = np.array([0.0, 50.0])
+
+
+def noise(**values: float) -> ReadingNoise:
+    return ReadingNoise({name: np.full((N, 1), value) for name, value in values.items()}, 25.0)
+
+
+def draws(made: ReadingNoise) -> np.ndarray:
+    return made.draw(np.broadcast_to(FORCE, (N, 2)), np.random.default_rng(0))
+
+
+def test_white_and_correlated_noise_add_up() -> None:
+    made = noise(noise_sd_N=0.3, noise_corr_sd_N=0.4)
+    assert draws(made).std(axis=0) == pytest.approx([0.5, 0.5], rel=0.02)
+    assert made.sd(np.zeros((N, 2)))[0, 0] == pytest.approx(0.5)
+
+
+def test_it_grows_with_the_force() -> None:
+    """At twice the force scale and a growth of one: √5 times the noise."""
+    made = noise(noise_sd_N=0.3, noise_growth=1.0)
+    assert draws(made).std(axis=0) == pytest.approx([0.3, 0.3 * np.sqrt(5.0)], rel=0.02)
+
+
+def test_heavy_tails() -> None:
+    found = draws(noise(noise_sd_N=0.3, noise_dof=3.0))[:, 0]
+    assert stats.kstest(found / 0.3, stats.t(3.0).cdf).pvalue > 1e-3
+    assert stats.kstest(found / 0.3, stats.norm.cdf).pvalue < 1e-6
+    assert np.abs(draws(noise(noise_sd_N=0.3, noise_dof=0.5))).max() <= 0.3 * FURTHEST
