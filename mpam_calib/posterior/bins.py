@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.white import Nodes
 from mpam_calib.specimen.recording import Loops
 
 Array = NDArray[np.float64]
