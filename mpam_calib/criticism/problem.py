@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from mpam_calib.criticism.noise_level import NoiseLevel, noise_level
+from mpam_calib.criticism.rows import Rows, saturated, without
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.readings import Readings
@@ -50,7 +51,8 @@ class Problem:
     """Reduced rows (n,): two Gauss points each in ``readings`` (2n), ``force`` (N), and where they belong.
 
     ``level``, ``cycle`` and ``stroke`` (n,) group the rows; ``noise`` (n, n) is the covariance of the
-    readings' noise; ``kernel`` (n, n) the remainder's for size 1 N.
+    readings' noise; ``kernel`` (n, n) the remainder's for size 1 N. ``saturated`` is the share of raw
+    readings at the end of the load cell's range (left out), ``rows`` holds the others.
     """
 
     blueprint: Blueprint
@@ -63,6 +65,8 @@ class Problem:
     kernel: Array
     noise_level: NoiseLevel
     has_clock: bool
+    saturated: float = 0.0
+    rows: Rows | None = None
 
     @cached_property
     def model(self) -> Model:
@@ -118,6 +122,7 @@ class Problem:
             stroke=self.stroke[index],
             noise=self.noise[np.ix_(index, index)],
             kernel=self.kernel[np.ix_(index, index)],
+            rows=None,
         )
 
     def covariance(self, size: float) -> Array:
@@ -158,10 +163,13 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     parts: list[tuple[Readings, Readings, Array, Ints, Array]] = []
     noise: NoiseLevel | None = None
     blocks: list[Array] = []
-    if specimen.loops is not None:
-        strokes = len(np.unique(specimen.loops.stroke))
-        bins = bin_loops(specimen.loops, int(np.clip(ROWS // strokes, 8, 32)))
-        noise = noise_level(specimen.loops, model)
+    loops, beyond = specimen.loops, 0.0
+    if loops is not None:
+        out = saturated(loops)
+        loops, beyond = without(loops, out), float(out.mean())
+        strokes = len(np.unique(loops.stroke))
+        bins = bin_loops(loops, int(np.clip(ROWS // strokes, 8, 32)))
+        noise = noise_level(loops, model)
         if noise is None:
             guess = model.setting.force_sd or _from_differences(bins.force, bins.segment)
             noise = NoiseLevel(guess, 0.0, 1.0)
@@ -203,7 +211,9 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         noise=np.asarray(linalg.block_diag(*blocks)),
         kernel=np.zeros((0, 0)),
         noise_level=noise,
-        has_clock=specimen.loops is not None,
+        has_clock=loops is not None,
+        saturated=beyond,
+        rows=None if loops is None else Rows.of(loops),
     )
     return replace(problem, kernel=_kernel(problem))
 

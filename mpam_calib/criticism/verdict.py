@@ -9,6 +9,7 @@ import numpy as np
 
 from mpam_calib.criticism.budget import remainder_rms
 from mpam_calib.criticism.problem import SIZES
+from mpam_calib.criticism.repeat import repeating
 from mpam_calib.criticism.search import Search, Set
 
 Word = Literal["adequate", "named", "ambiguous", "unexplained"]
@@ -46,8 +47,11 @@ def judge(found: Search) -> Verdict:
     marginals = {e: float(sum(w for s, w in probabilities.items() if e in s)) for e in found.tested}
     leading = sets[0]
     size = found.best_size(leading)
-    structured = _structure_left(found, leading, size)
-    if structured:
+    if (
+        found.problem.saturated > 0.0
+        or _structure_left(found, leading, size)
+        or _repeats(found, leading, size)
+    ):
         standing = _standing(found, leading)
         return Verdict("unexplained", leading, standing, probabilities, marginals, size)
     if not leading and probabilities[leading] > 0.5:
@@ -72,6 +76,15 @@ def _structure_left(found: Search, leading: Set, size: int) -> bool:
     if bare is not None and held.log_evidence - bare.log_evidence < LEAD:
         return False
     return remainder_rms(found.problem, held) > NOISE_SIZE * found.problem.noise_level.total
+
+
+def _repeats(found: Search, leading: Set, size: int) -> bool:
+    """Whether the strokes share a fine structure, above the noise, that the leading set leaves."""
+    problem = found.problem
+    if problem.rows is None:
+        return False
+    shared = repeating(problem.rows, problem.blueprint.model_dump_json(), found.fits[leading, size])
+    return shared > NOISE_SIZE * problem.noise_level.total
 
 
 def _standing(found: Search, leading: Set) -> Set:

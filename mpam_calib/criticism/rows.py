@@ -1,0 +1,66 @@
+"""The raw readings behind the reduced rows, and which of them the load cell could not show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.bins import row_readings
+from mpam_calib.specimen.recording import Loops
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MOST_ROWS = 40_000
+"""Raw readings that are kept: whole strokes, from the first on."""
+TIES, TIES_SHARE = 10, 0.005
+"""A load cell saturates where so many readings, and such a share of them, are the same extreme value ..."""
+OUTSTANDING = 8.0
+"""... and so many times as many as at the next values (a coarse converter repeats all of them)."""
+NEXT = 5
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Raw readings (n,) in strokes: what the model needs, force (N), stroke; censored ones left out."""
+
+    readings: Readings
+    force: Array
+    stroke: Ints
+
+    @staticmethod
+    def of(loops: Loops) -> Rows:
+        """The first strokes of the loops."""
+        keep = ~loops.censored
+        if len(keep) > MOST_ROWS:
+            keep = keep & (loops.stroke < loops.stroke[MOST_ROWS])
+        index = np.flatnonzero(keep)
+        return Rows(row_readings(loops).take(index), loops.force_N[index], loops.stroke[index])
+
+
+def saturated(loops: Loops) -> NDArray[np.bool_]:
+    """Readings (rows,) at an end of the load cell's range that many share; the declared floor is none."""
+    values, counts = np.unique(loops.force_N[~loops.censored], return_counts=True)
+    found = np.zeros(len(loops.force_N), dtype=bool)
+    ends = ((values[-1], counts[-1], counts[-1 - NEXT : -1]), (values[0], counts[0], counts[1 : 1 + NEXT]))
+    for value, count, near in ends:
+        enough = count >= max(TIES, TIES_SHARE * len(found))
+        if enough and len(near) and count > OUTSTANDING * near.mean():
+            found |= (loops.force_N == value) & ~loops.censored
+    return found
+
+
+def without(loops: Loops, rows: NDArray[np.bool_]) -> Loops:
+    """The loops without some of their rows."""
+    if not rows.any():
+        return loops
+    arrays: dict[str, Any] = {
+        f.name: value[~rows]
+        for f in fields(loops)
+        if isinstance(value := getattr(loops, f.name), np.ndarray) and len(value) == len(rows)
+    }
+    return replace(loops, **arrays)
