@@ -14,11 +14,14 @@ from mpam_calib.posterior.covariance import fast_noise_log_likelihood
 from mpam_calib.specimen.recording import Loops
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 WINDOW, DEGREE = 32, 3
 """Windows of at most so many rows, detrended by a polynomial of this degree ..."""
 SHORT_DEGREE = 5
 """... or of this one, where a stroke is so short that it is one window."""
+FEWEST_PAIRS = 6
+"""Pairs of repeated strokes that are enough to tell the noise from."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,8 @@ def _windows(loops: Loops) -> tuple[Array, int, Array, float] | None:
     length = np.diff(np.append(first, len(loops.stroke)))
     typical = int(np.median(length))
     size, degree, margin = min(WINDOW, typical // 4), DEGREE, max(min(WINDOW, typical // 4) // 4, 2)
+    if size < DEGREE + 4 and (found := _between_cycles(loops, first, length)) is not None:
+        return found
     if size < DEGREE + 4:
         # The whole stroke, with a stiffer curve taken out: differences of far rows see the curve itself.
         size, degree, margin = min(WINDOW, int(np.quantile(length, 0.25))), SHORT_DEGREE, 0
@@ -84,11 +89,38 @@ def _windows(loops: Loops) -> tuple[Array, int, Array, float] | None:
     index = index[~loops.censored[index].any(axis=1)]
     if len(index) < 4:
         return None
+    dt = float(np.median((loops.time_s[index[:, -1]] - loops.time_s[index[:, 0]]) / (size - 1)))
+    return _scatter(loops.force_N[index], degree, dt)
+
+
+def _between_cycles(loops: Loops, first: Ints, length: Ints) -> tuple[Array, int, Array, float] | None:
+    """The same from differences of strokes that repeat each other: short strokes leave no other way.
+
+    What the muscle does, and whatever is wrong with it, comes back in the next cycle; noise does not.
+    """
+    groups: dict[tuple[int, int, int], list[int]] = {}
+    for stroke, (f, n) in enumerate(zip(first, length, strict=True)):
+        if not loops.censored[f : f + n].any():
+            groups.setdefault((int(loops.level[f]), int(loops.branch[f]), int(n)), []).append(int(stroke))
+    pairs = np.array([pair for g in groups.values() for pair in zip(g[0::2], g[1::2], strict=False)])
+    if len(pairs) < FEWEST_PAIRS:
+        return None
+    size = min(WINDOW, int(length[pairs[:, 0]].min()))
+    if size < DEGREE + 4:
+        return None
+    rows = first[pairs][:, :, None] + np.arange(size)
+    difference = (loops.force_N[rows[:, 0]] - loops.force_N[rows[:, 1]]) / np.sqrt(2.0)
+    dt = float(np.median((loops.time_s[rows[:, 0, -1]] - loops.time_s[rows[:, 0, 0]]) / (size - 1)))
+    return _scatter(difference, DEGREE, dt)
+
+
+def _scatter(windows: Array, degree: int, dt: float) -> tuple[Array, int, Array, float]:
+    """Scatter of windows (k, size) less a polynomial, how many were kept, the contrasts, time step."""
+    size = windows.shape[1]
     full, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, size), degree + 1), mode="complete")
     contrast = np.asarray(full[:, degree + 1 :], dtype=np.float64)
-    projected = loops.force_N[index] @ contrast
+    projected = windows @ contrast
     # A burst or a snap must not pass for noise: windows far above the typical one are left out.
     power = np.mean(projected**2, axis=1)
     kept = power <= 4.0 * np.median(power)
-    dt = float(np.median((loops.time_s[index[:, -1]] - loops.time_s[index[:, 0]]) / (size - 1)))
     return projected[kept].T @ projected[kept], int(kept.sum()), contrast, max(dt, 1e-9)
