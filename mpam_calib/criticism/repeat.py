@@ -20,6 +20,8 @@ DEGREE = 6
 """Degree of the curve that is taken out of each stroke."""
 FEWEST = 24
 """Readings of a stroke that is long enough to be looked at."""
+AWAY = 0.9
+"""Middle share of a stroke that is looked at."""
 SHIFTS = 200
 """Random shifts that show what noise alone adds up to."""
 SURE = 6.0
@@ -59,11 +61,18 @@ def _profiles(rows: Rows, residual: Array, here: NDArray[np.bool_]) -> Array | N
     if len(strokes) < 3:
         return None
     reach = float(np.quantile([rows.readings.displacement[rows.stroke == s].max() for s in strokes], 0.1))
-    grid = np.linspace(0.0, reach, int(np.clip(np.median(counts[counts >= FEWEST]), FEWEST, 400)))
+    grid = np.linspace(
+        0.5 * (1.0 - AWAY) * reach,
+        0.5 * (1.0 + AWAY) * reach,
+        int(np.clip(np.median(counts[counts >= FEWEST]), FEWEST, 400)),
+    )
     found = []
     for s in strokes:
         inside = np.flatnonzero(rows.stroke == s)
         x = rows.readings.displacement[inside]
+        # Next to a turn the crosshead hardly moves, and its friction is nobody's model.
+        away = np.abs(x - 0.5 * (x.min() + x.max())) < 0.5 * AWAY * np.ptp(x)
+        inside, x = inside[away], x[away]
         order = np.argsort(x)
         left = residual[inside] - Polynomial.fit(x, residual[inside], DEGREE)(x)
         found.append(np.interp(grid, x[order], left[order]))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
-from mpam_calib.model.bend import FORM
+from mpam_calib.model.bend import BENDS, FORM
 from mpam_calib.model.effect import effect
 
 Array = NDArray[np.float64]
@@ -43,32 +43,55 @@ class Search:
     problem: Problem
     tested: tuple[str, ...]
     fits: dict[tuple[Set, int], Fit] = field(default_factory=dict)
-    kind: dict[str, str] = field(default_factory=dict)
-    """The flexible form in which each effect did best alone."""
     polished: set[tuple[Set, int]] = field(default_factory=set)
 
     def refit(self, effects: Set, size: int, starts: Iterable[dict[str, float]] = ({},)) -> Fit:
-        """The best exact refit of a set: over its effects' forms and from some starts.
+        """The best exact refit of a set, from where its best parts ended and from some starts.
 
         The search goes by bent forms, which hold most shapes; :meth:`polish` then tries the others one at
-        a time. Having had a choice of forms is paid for.
+        a time, and larger sets take over what it chose. Having had a choice of forms is paid for.
         """
         key = (effects, size)
         if key in self.fits:
             return self.fits[key]
-        choices = [{e: self.kind.get(e, flexible(e)[0]) for e in effects}]
-        if len(effects) == 1:
-            choices = [{e: form} for e in effects for form in flexible(e)]
+        near = next((f for s in (size - 1, size + 1) if (f := self.fits.get((effects, s)))), None)
+        if near is not None and len(effects) > 1:
+            tries = [(_forms(near), _ended(near))]
+        elif len(effects) > 1:
+            choice, start = self._from_parts(effects, size)
+            tries = [(choice, start), *((choice, s) for s in starts)]
+        else:
+            tries = [({e: form}, s) for e in effects for form in flexible(e) for s in starts] or [({}, {})]
         best: Fit | None = None
-        for choice in choices:
-            for start in self._inherited(effects, size) or starts:
-                best = self._better(best, choice, size, start)
+        for choice, start in tries:
+            best = self._better(best, choice, size, start)
         if best is None:
             raise np.linalg.LinAlgError(f"no fit of {sorted(effects)}")
         self.fits[key] = best
-        if len(effects) == 1 and size == self.best_size(effects):
-            self.kind.update({e.partition(":")[0]: e for e in best.effects})
         return best
+
+    def _from_parts(self, effects: Set, size: int) -> tuple[dict[str, str], dict[str, float]]:
+        """Forms and sizes of the best part of a set, and of the effect that it lacks."""
+        parts = [
+            p for p in map(frozenset, combinations(sorted(effects), len(effects) - 1)) if self._known(p, size)
+        ]
+        if not parts:
+            return {e: flexible(e)[0] for e in effects}, {}
+        part = max(parts, key=self.score)
+        base = self._known(part, size)
+        (new,) = effects - part
+        own = self._known(frozenset([new]), size)
+        assert base is not None
+        forms = _forms(base) | ({new: flexible(new)[0]} if own is None else _forms(own))
+        start = {} if own is None else {n: u for n, u in _ended(own).items() if BENDS not in n}
+        return forms, start | _ended(base)
+
+    def _known(self, effects: Set, size: int) -> Fit | None:
+        """The set's fit beside a remainder of this size, or of the size that suits it best."""
+        if (effects, size) in self.fits:
+            return self.fits[effects, size]
+        seen = [s for s in range(len(SIZES)) if (effects, s) in self.fits]
+        return self.fits[effects, self.best_size(effects)] if seen else None
 
     def polish(self, effects: Set, size: int) -> None:
         """Change one form of a set at a time, as long as that helps."""
@@ -79,8 +102,7 @@ class Search:
         for e in sorted(effects):
             for form in forms_of(e):
                 assert best is not None
-                choice = {c.partition(":")[0]: c for c in best.effects} | {e: form}
-                best = self._better(best, choice, size, dict(zip(best.names, best.u.tolist(), strict=True)))
+                best = self._better(best, _forms(best) | {e: form}, size, _ended(best))
         assert best is not None
         self.fits[effects, size] = best
 
@@ -94,25 +116,6 @@ class Search:
         paid = sum(log(len(forms_of(e))) for e in choice)
         found = replace(found, log_evidence=found.log_evidence - paid)
         return found if best is None or found.log_evidence > best.log_evidence else best
-
-    def _inherited(self, effects: Set, size: int) -> list[dict[str, float]]:
-        """Where the set ended beside another remainder, and where its subsets did, together."""
-        near = [
-            known for other in (size - 1, size + 1) if (known := self.fits.get((effects, other))) is not None
-        ]
-        if near and len(effects) > 1:
-            return [dict(zip(near[0].names, near[0].u.tolist(), strict=True))]
-        found: dict[str, float] = {}
-        if len(effects) == 1:
-            return []
-        for smaller in [
-            frozenset(),
-            *map(frozenset, combinations(sorted(effects), max(len(effects) - 1, 1))),
-        ]:
-            known = self.fits.get((smaller, size)) if smaller != effects else None
-            if known is not None:
-                found.update(dict(zip(known.names, known.u.tolist(), strict=True)))
-        return [found] if found else []
 
     def log_prior(self, effects: Set) -> float:
         """Log prior of a set (up to a constant)."""
@@ -139,6 +142,16 @@ class Search:
         return sorted({key[0] for key in self.fits}, key=lambda s: -self.score(s))
 
 
+def _forms(found: Fit) -> dict[str, str]:
+    """The form of each effect of a fit."""
+    return {e.partition(":")[0]: e for e in found.effects}
+
+
+def _ended(found: Fit) -> dict[str, float]:
+    """Where a fit ended."""
+    return dict(zip(found.names, found.u.tolist(), strict=True))
+
+
 def search(
     problem: Problem,
     tested: tuple[str, ...],
@@ -159,6 +172,8 @@ def search(
         _try(found, frozenset([identifier]), range(len(SIZES)), curved=True)
         tell(0.3 * (number + 1) / len(tested))
     kept = _keep(found, 1, width)
+    for effects in kept:
+        _polish(found, effects)
     singles = [next(iter(s)) for s in _keep(found, 1, PARTNERS)]
     for k in range(2, LARGEST + 1):
         tries = {s | {p} for s in kept for p in _partners(found, s, singles) if p not in s}
@@ -172,6 +187,7 @@ def search(
         kept = _keep(found, k, width)
         for effects in kept:
             _try(found, effects, range(len(SIZES)))
+            _polish(found, effects)
     for _ in range(2):
         for effects in found.sets[:LEADERS]:
             # A leader's own parts must have been looked at, or it could hide a passenger.

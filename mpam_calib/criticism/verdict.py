@@ -19,6 +19,8 @@ SURE, LEAD = 0.95, 5.0
 LISTED = 5
 NOISE_SIZE = 0.5
 """A remainder whose root mean square is below this share of a reading's noise is at its level."""
+REPEAT_SIZE = 0.35
+"""The same for fine structure that repeats, which itself passes for noise in a single stroke."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def _repeats(found: Search, leading: Set, size: int) -> bool:
     if problem.rows is None:
         return False
     shared = repeating(problem.rows, problem.blueprint.model_dump_json(), found.fits[leading, size])
-    return shared > NOISE_SIZE * problem.noise_level.total
+    return shared > REPEAT_SIZE * problem.noise_level.total
 
 
 def _standing(found: Search, leading: Set) -> Set:

@@ -16,16 +16,19 @@ from pathlib import Path
 import numpy as np
 from rig import case as rig_case
 from rig import margins, recipes, sets
+from rig.effects import form as rig_form
 
 from mpam_calib.criticism.candidates import candidates
 from mpam_calib.criticism.problem import build_problem
-from mpam_calib.criticism.search import search
+from mpam_calib.criticism.search import Search, search
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Options, draw_blueprint
+from mpam_calib.model.effect import effect
 from mpam_calib.specimen import read
+from mpam_calib.units import si_factor
 
-FIELDS = ["name", "group", "truth", "outside", "word", "named", "listed", "probability"]
+FIELDS = ["name", "group", "truth", "outside", "word", "named", "listed", "probability", "inside", "sized"]
 LISTED = 5
 NATS = 10.0
 """Nats by which the oracle must prefer the truth for a case to count as separable."""
@@ -43,6 +46,27 @@ class Scored:
     named: frozenset[str]
     listed: tuple[frozenset[str], ...]
     probability: float
+    inside: int = 0
+    sized: int = 0
+
+
+def _inside(search: Search, effects: frozenset[str], one: rig_case.Case) -> tuple[int, int]:
+    """How many hidden sizes of a form that the package shares lie in their 90 % bands, and of how many."""
+    fitted = search.fits[effects, search.best_size(effects)]
+    priors = {
+        p.name: p.prior for e in fitted.effects for p in effect(e).parameters(search.problem.model.setting)
+    }
+    hits = of = 0
+    for hidden in one.hidden:
+        form = rig_form(hidden.id, hidden.form)
+        if not form.shared or form.parameter not in priors:
+            continue
+        i = fitted.names.index(form.parameter)
+        half = 1.645 * float(np.sqrt(fitted.covariance[i, i]))
+        low, high = priors[form.parameter].from_normal(fitted.u[i] + np.array([-half, half]))
+        of += 1
+        hits += bool(low <= hidden.size * si_factor(form.parameter) <= high)
+    return hits, of
 
 
 def score_case(recipe: recipes.Recipe) -> Scored:
@@ -58,11 +82,15 @@ def score_case(recipe: recipes.Recipe) -> Scored:
                 one.name, one.group, truth, one.outside is not None, "refused", frozenset(), (), 0.0
             )
     problem = build_problem(specimen, draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
-    verdict = judge(search(problem, candidates(problem).tested))
+    found = search(problem, candidates(problem).tested)
+    verdict = judge(found)
+    truth = frozenset(one.ids)
+    named_right = bool(truth) and verdict.word == "named" and verdict.standing == truth
+    inside, sized = _inside(found, truth, one) if named_right else (0, 0)
     best = list(verdict.probabilities.items())[:LISTED]
     return Scored(
-        one.name, one.group, frozenset(one.ids), one.outside is not None, verdict.word,
-        verdict.standing, tuple(s for s, _ in best), best[0][1],
+        one.name, one.group, truth, one.outside is not None, verdict.word,
+        verdict.standing, tuple(s for s, _ in best), best[0][1], inside, sized,
     )  # fmt: skip
 
 
@@ -82,6 +110,8 @@ def _row(s: Scored) -> list[str]:
         named,
         listed,
         f"{s.probability:.4f}",
+        str(s.inside),
+        str(s.sized),
     ]
 
 
@@ -92,6 +122,7 @@ def _parsed(row: dict[str, str]) -> Scored:
     return Scored(
         row["name"], row["group"], ids(row["truth"]), row["outside"] == "1", row["word"], ids(row["named"]),
         tuple(ids(t) for t in row["listed"].split("|") if t), float(row["probability"]),
+        int(row["inside"]), int(row["sized"]),
     )  # fmt: skip
 
 
@@ -127,6 +158,11 @@ def rates(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
         ("nothing hidden: nothing named", sum(s.word == "adequate" for s in null), len(null)),
         ("outside: unexplained", sum(s.word == "unexplained" for s in outside), len(outside)),
         ("outside: no false name", sum(s.named <= s.truth for s in outside), len(outside)),
+        (
+            "named: size of a shared form in its band",
+            sum(s.inside for s in scored),
+            sum(s.sized for s in scored),
+        ),
     ]
 
 
@@ -137,6 +173,7 @@ def main(which: str, shard: int = 0, shards: int = 1, workers: int = 2) -> None:
     done = list(csv.DictReader(path.open())) if path.exists() else []
     names = {row["name"] for row in done}
     todo = [r for r in sets.recipes(which)[shard::shards] if r.name not in names]
+    todo.sort(key=lambda r: r.seed)  # so that what an interrupted run has done is a fair sample
     with path.open("a", newline="") as file, ProcessPoolExecutor(workers) as pool:
         writer = csv.writer(file, lineterminator="\n")
         if not done:
