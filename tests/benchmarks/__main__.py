@@ -22,6 +22,7 @@ from .problem import NAMES, as_rows, specimen
 Array = NDArray[np.float64]
 
 WANTED = 4000
+DENSER = "ten times the readings a second"
 DRAWS = 2000
 """Draws of each of the others' chains."""
 
@@ -124,15 +125,7 @@ def main() -> None:
         as_rows(specimen()).save(folder / "rows.npz")
         short = launch(f"ours white {WANTED} 1800 1", folder)
         ours = launch(f"ours white {10 * WANTED} 1800 1", folder)
-        more = {
-            "ten times the readings a second": launch(f"ours white {10 * WANTED} 18000 1", folder),
-            "ten cycles": launch(f"ours white {10 * WANTED} 1800 10", folder),
-        }
         full = launch(f"ours full {WANTED} 1800 1", folder)
-        more_full = {
-            "ten times the readings a second": launch(f"ours full {WANTED} 18000 1", folder),
-            "ten cycles": launch(f"ours full {WANTED} 1800 10", folder),
-        }
         for library in ("nutpie", "pymc"):
             launch(f"{library} rows 10", folder)  # fills their caches of compiled code
         others = {
@@ -140,6 +133,11 @@ def main() -> None:
             for kind, label in (("rows", "all rows"), ("statistics", "sufficient statistics"))
             for library in ("nutpie", "pymc")
         }
+        more = {
+            DENSER: launch(f"ours white {10 * WANTED} 18000 1", folder),
+            "ten cycles": launch(f"ours white {10 * WANTED} 1800 10", folder),
+        }
+        more_full = {DENSER: launch(f"ours full {WANTED} 18000 1", folder)}
     libraries = ", ".join(
         f"{n} {version(n)}" for n in ("emcee", "nutpie", "pymc", "pytensor", "numba", "numpy", "arviz")
     )
@@ -179,10 +177,9 @@ def _targets(
     per_cpu = ours.rates[1] / max(outcome.rates[1] for outcome in rows)
     sooner = min(outcome.to_wanted(scaled=True)[0] for outcome in rows) / short.process[0]
     sooner_cpu = min(outcome.to_wanted(scaled=True)[1] for outcome in rows) / short.process[1]
-    dense = "ten times the readings a second"
     growth = max(
-        ours.rates[1] / more[dense].rates[1],
-        full.rates[1] / more_full[dense].rates[1],
+        ours.rates[1] / more[DENSER].rates[1],
+        full.rates[1] / more_full[DENSER].rates[1],
     )
     largest = max(short.memory, full.memory, ours.memory)
     print("\n| target | wanted | measured |\n|---|---|---|")
