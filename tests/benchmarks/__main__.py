@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.posterior.convergence import diagnose_chains
+from mpam_calib.posterior.effective import ess_bulk
 
 from .problem import NAMES, as_rows, specimen
 
@@ -91,20 +92,22 @@ def _effective(figures: Array) -> float:
 
 def disagreement(one: Outcome, other: Outcome) -> tuple[float, float]:
     """Largest difference of means, and of sds, in Monte Carlo errors."""
-    import arviz as az
-
     worst = [0.0, 0.0]
     for i in range(len(NAMES)):
-        found = []
-        for outcome in (one, other):
-            x = outcome.figures[..., i]
-            x = np.moveaxis(x, 2, 1).reshape(-1, x.shape[1])
-            error = [float(az.mcse(x, method=method)) for method in ("mean", "sd")]
-            found.append(((x.mean(), x.std()), error))
+        found = [_moments(outcome.figures[..., i]) for outcome in (one, other)]
         for j in range(2):
-            difference = abs(found[0][0][j] - found[1][0][j])
-            worst[j] = max(worst[j], difference / np.hypot(found[0][1][j], found[1][1][j]))
+            difference = abs(found[0][j][0] - found[1][j][0])
+            worst[j] = max(worst[j], difference / np.hypot(found[0][j][1], found[1][j][1]))
     return worst[0], worst[1]
+
+
+def _moments(x: Array) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Mean and sd of draws (ensembles, steps, walkers), each with its Monte Carlo error."""
+    chains = np.moveaxis(x, 2, 1).reshape(-1, x.shape[1])
+    mean, sd = float(x.mean()), float(x.std())
+    squares = (chains - mean) ** 2
+    error = float(squares.std()) / np.sqrt(ess_bulk(squares)) / (2.0 * sd)
+    return (mean, sd / np.sqrt(ess_bulk(chains))), (sd, error)
 
 
 def line(name: str, outcome: Outcome, times: tuple[float, float], ours: Outcome | None, at: float) -> str:
