@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mpam_calib.model.model import Model
 from mpam_calib.posterior.batch import batch_size
 from mpam_calib.posterior.collapsed import Collapsed
+from mpam_calib.posterior.pool import held_target, workers
 from mpam_calib.posterior.sampling import Sampling
 from mpam_calib.units import KPA, si_factor, unit_of
 
@@ -47,16 +48,18 @@ def keep_draws(target: Collapsed, sampling: Sampling, seed: int, kept: int | Non
     E, T, W, d = sampling.chain.shape
     keep = np.unique(np.linspace(0, T * W - 1, kept or T * W).astype(np.int64))
     u = sampling.chain.reshape(E, T * W, d)[:, keep].reshape(-1, d)
-    rng = np.random.default_rng([seed, 1])
-    values = target.model.values(u)
     size = batch_size(target)
-    eta = np.concatenate(
-        [
-            target.linear_draws({k: v[i : i + size] for k, v in values.items()}, rng)
-            for i in range(0, len(u), size)
-        ]
-    )
-    return Draws(u, values, eta, E)
+    tasks = [(u[i : i + size], [seed, 1, i]) for i in range(0, len(u), size)]
+    with workers(target, E) as pool:
+        eta = np.concatenate(pool.map(_draw_back, tasks))
+    return Draws(u, target.model.values(u), eta, E)
+
+
+def _draw_back(task: tuple[Array, list[int]]) -> Array:
+    """η for coordinates u (in a worker)."""
+    u, seeds = task
+    target = held_target()
+    return target.linear_draws(target.model.values(u), np.random.default_rng(seeds))
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.posterior.convergence import diagnose_chains
+from mpam_calib.posterior.effective import ess_bulk
 
 from .problem import NAMES, as_rows, specimen
 
 Array = NDArray[np.float64]
 
 WANTED = 4000
+DENSER = "ten times the readings a second"
 DRAWS = 2000
 """Draws of each of the others' chains."""
 
@@ -90,20 +92,22 @@ def _effective(figures: Array) -> float:
 
 def disagreement(one: Outcome, other: Outcome) -> tuple[float, float]:
     """Largest difference of means, and of sds, in Monte Carlo errors."""
-    import arviz as az
-
     worst = [0.0, 0.0]
     for i in range(len(NAMES)):
-        found = []
-        for outcome in (one, other):
-            x = outcome.figures[..., i]
-            x = np.moveaxis(x, 2, 1).reshape(-1, x.shape[1])
-            error = [float(az.mcse(x, method=method)) for method in ("mean", "sd")]
-            found.append(((x.mean(), x.std()), error))
+        found = [_moments(outcome.figures[..., i]) for outcome in (one, other)]
         for j in range(2):
-            difference = abs(found[0][0][j] - found[1][0][j])
-            worst[j] = max(worst[j], difference / np.hypot(found[0][1][j], found[1][1][j]))
+            difference = abs(found[0][j][0] - found[1][j][0])
+            worst[j] = max(worst[j], difference / np.hypot(found[0][j][1], found[1][j][1]))
     return worst[0], worst[1]
+
+
+def _moments(x: Array) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Mean and sd of draws (ensembles, steps, walkers), each with its Monte Carlo error."""
+    chains = np.moveaxis(x, 2, 1).reshape(-1, x.shape[1])
+    mean, sd = float(x.mean()), float(x.std())
+    squares = (chains - mean) ** 2
+    error = float(squares.std()) / np.sqrt(ess_bulk(squares)) / (2.0 * sd)
+    return (mean, sd / np.sqrt(ess_bulk(chains))), (sd, error)
 
 
 def line(name: str, outcome: Outcome, times: tuple[float, float], ours: Outcome | None, at: float) -> str:
@@ -124,15 +128,7 @@ def main() -> None:
         as_rows(specimen()).save(folder / "rows.npz")
         short = launch(f"ours white {WANTED} 1800 1", folder)
         ours = launch(f"ours white {10 * WANTED} 1800 1", folder)
-        more = {
-            "ten times the readings a second": launch(f"ours white {10 * WANTED} 18000 1", folder),
-            "ten cycles": launch(f"ours white {10 * WANTED} 1800 10", folder),
-        }
         full = launch(f"ours full {WANTED} 1800 1", folder)
-        more_full = {
-            "ten times the readings a second": launch(f"ours full {WANTED} 18000 1", folder),
-            "ten cycles": launch(f"ours full {WANTED} 1800 10", folder),
-        }
         for library in ("nutpie", "pymc"):
             launch(f"{library} rows 10", folder)  # fills their caches of compiled code
         others = {
@@ -140,6 +136,11 @@ def main() -> None:
             for kind, label in (("rows", "all rows"), ("statistics", "sufficient statistics"))
             for library in ("nutpie", "pymc")
         }
+        more = {
+            DENSER: launch(f"ours white {10 * WANTED} 18000 1", folder),
+            "ten cycles": launch(f"ours white {10 * WANTED} 1800 10", folder),
+        }
+        more_full = {DENSER: launch(f"ours full {WANTED} 18000 1", folder)}
     libraries = ", ".join(
         f"{n} {version(n)}" for n in ("emcee", "nutpie", "pymc", "pytensor", "numba", "numpy", "arviz")
     )
@@ -179,10 +180,9 @@ def _targets(
     per_cpu = ours.rates[1] / max(outcome.rates[1] for outcome in rows)
     sooner = min(outcome.to_wanted(scaled=True)[0] for outcome in rows) / short.process[0]
     sooner_cpu = min(outcome.to_wanted(scaled=True)[1] for outcome in rows) / short.process[1]
-    dense = "ten times the readings a second"
     growth = max(
-        ours.rates[1] / more[dense].rates[1],
-        full.rates[1] / more_full[dense].rates[1],
+        ours.rates[1] / more[DENSER].rates[1],
+        full.rates[1] / more_full[DENSER].rates[1],
     )
     largest = max(short.memory, full.memory, ours.memory)
     print("\n| target | wanted | measured |\n|---|---|---|")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 import mpam_calib as mc
@@ -14,8 +16,8 @@ from .problem import NAMES
 from .stopwatch import Drawn, Stopwatch
 
 
-def draw(specimen: Specimen, options: Options, ess: float) -> Drawn:
-    """Calibrate until ``ess``. What counts as sampling begins after the first block of steps.
+def draw(specimen: Specimen, options: Options, ess: float, thin: int) -> Drawn:
+    """Calibrate until ``ess``, counting every ``thin``-th step. Sampling begins after the first block.
 
     Everything else is in it: the checks whether to go on, and drawing the moduli for each draw.
     """
@@ -27,16 +29,12 @@ def draw(specimen: Specimen, options: Options, ess: float) -> Drawn:
 
     made = mc.calibrate(specimen, options=options, ess_wanted=ess, max_steps=100_000, listener=listen)
     wall, cpu = watches[0].read()
-    ensembles, steps, walkers, _ = made.sampling.chain.shape
+    steps = made.sampling.chain.shape[1]
+    # The first block's time is not counted, nor are its draws; a short run is one block.
+    counted = made.sampling.chain[:, BLOCK if steps > BLOCK else 0 :: thin]
     watch = Stopwatch()
-    draws = keep_draws(made.target, made.sampling, seed=0, kept=None)
+    draws = keep_draws(made.target, replace(made.sampling, chain=counted), seed=0, kept=None)
     listed = {item.name: item.draws for item in reported(made.model, draws)}
     figures = np.stack([listed[name] for name in NAMES], axis=-1)
     own_wall, own_cpu = watch.read()
-    share = 1.0 - BLOCK / steps
-    # The time before the first block's end is not counted, nor are its draws; a short run is one block.
-    return Drawn(
-        figures.reshape(ensembles, steps, walkers, -1)[:, BLOCK if steps > BLOCK else 0 :],
-        wall + share * own_wall,
-        cpu + share * own_cpu,
-    )
+    return Drawn(figures.reshape(*counted.shape[:3], -1), wall + own_wall, cpu + own_cpu)

@@ -25,7 +25,7 @@ def run(job: str, folder: Path) -> Drawn:
 
     ess, rows, cycles = (int(number) for number in numbers)
     full = what == "full"
-    return draw(specimen(rows, cycles, correlated=full), FULL if full else WHITE_ONLY, ess)
+    return draw(specimen(rows, cycles, correlated=full), FULL if full else WHITE_ONLY, ess, 2 if full else 1)
 
 
 def peak_memory() -> float:
