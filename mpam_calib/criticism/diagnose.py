@@ -13,6 +13,7 @@ from mpam_calib.criticism.candidates import Candidates, candidates
 from mpam_calib.criticism.gain import Gain, measure_gain
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.search import LARGEST, Search, Set, search
+from mpam_calib.criticism.structure import Structure, structure_tests
 from mpam_calib.criticism.verdict import LISTED, Verdict, judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
@@ -34,6 +35,8 @@ class Diagnosis:
     verdict: Verdict
     budget: Budget
     gain: Gain | None
+    structure: list[tuple[Structure, Structure]]
+    """Every test of structure before and after."""
 
     @property
     def causes(self) -> list[str]:
@@ -73,7 +76,9 @@ def diagnose(
     if verdict.standing:
         listener("measuring the gain", 0.0)
         gain = measure_gain(problem, tested.tested, verdict.standing)
-    return Diagnosis(problem, tested, found, verdict, budget, gain)
+    fits = [found.fits[s, found.best_size(s)] for s in (frozenset(), verdict.standing)]
+    structure = list(zip(*(structure_tests(problem, f) for f in fits), strict=True))
+    return Diagnosis(problem, tested, found, verdict, budget, gain, structure)
 
 
 def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
@@ -94,6 +99,18 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "misfit_after_N": _round(budget.after),
         "remainder_N": _round(budget.remainder),
         "gain": None,
+        "structure": [
+            {
+                "against": before.against,
+                "p_before": _round(before.p_value),
+                "p_after": _round(after.p_value),
+                "rms_before_N": _round(before.size),
+                "rms_after_N": _round(after.size),
+            }
+            for before, after in diagnosis.structure
+        ],
+        "saturated_share": _round(diagnosis.problem.saturated),
+        "repeating_N": _round(verdict.repeating),
         "searched": {
             "sets": len(diagnosis.search.sets),
             "refits": len(diagnosis.search.fits),

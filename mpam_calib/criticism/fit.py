@@ -123,7 +123,7 @@ def fit(
         else:
             fixed, columns = terms(u + offsets, guide)
         whole, whole_columns = fixed[0], columns[0]
-        fixed = 0.5 * (fixed[:, first] + fixed[:, second])
+        fixed = 0.5 * (fixed[:, first] + fixed[:, second]) + problem.bow
         columns = 0.5 * (columns[:, first] + columns[:, second])
         white = (axes @ np.column_stack([problem.force - fixed[0], columns[0]])) / spread
         residual, X = white[:, 0], white[:, 1:]

@@ -110,6 +110,38 @@ class Problem:
         second[fast] = n + len(fast) + np.arange(len(fast))
         return readings, first, second
 
+    @cached_property
+    def bow(self) -> Array:
+        """What the mean force of each row (n,) is above the force at its places in ``lean``, N.
+
+        The curvature within a row, from the declared simulation with its moduli fitted: effects hardly
+        change it.
+        """
+        chain, n = self.model.chain, len(self)
+        assert chain is not None
+        values = {p.name: p.prior.from_normal(np.zeros((1, 1))) for p in chain.parameters} or {
+            "": np.zeros((1, 1))
+        }
+        force = np.concatenate([self.force, self.force])
+
+        def at(readings: Readings, guide: Array) -> tuple[Array, Array]:
+            terms = chain.terms(values, readings, guide)
+            m = len(readings)
+            columns = np.broadcast_to(terms.columns, (1, m, chain.linear_size))[0]
+            return np.broadcast_to(terms.fixed, (1, m))[0], columns
+
+        fixed, columns = at(self.readings, force)
+        X = columns / self.noise_level.total
+        residual = (force - fixed) / self.noise_level.total
+        eta = linalg.solve(X.T @ X + np.eye(X.shape[1]), X.T @ residual) if X.shape[1] else np.zeros(0)
+        whole = fixed + columns @ eta
+        readings, first, second = self.lean
+        guide = np.empty(len(readings))
+        guide[:n], guide[first], guide[second] = self.force, self.force, self.force
+        fixed, columns = at(readings, guide)
+        lean = fixed + columns @ eta
+        return np.asarray(0.5 * (whole[:n] + whole[n:]) - 0.5 * (lean[first] + lean[second]))
+
     def take(self, rows: NDArray[np.bool_]) -> Problem:
         """The problem on some of its rows (a fold)."""
         index = np.flatnonzero(rows)

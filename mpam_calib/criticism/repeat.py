@@ -28,7 +28,7 @@ SURE = 6.0
 """Standard deviations above that."""
 
 
-def repeating(rows: Rows, blueprint_json: str, fitted: Fit) -> float:
+def repeating_rms(rows: Rows, blueprint_json: str, fitted: Fit) -> float:
     """Root mean square (N) of the fine structure that a branch's strokes share; 0 where noise explains it.
 
     ``blueprint_json`` is the declared simulation that ``fitted`` extends.

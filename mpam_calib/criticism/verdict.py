@@ -9,7 +9,7 @@ import numpy as np
 
 from mpam_calib.criticism.budget import remainder_rms
 from mpam_calib.criticism.problem import SIZES
-from mpam_calib.criticism.repeat import repeating
+from mpam_calib.criticism.repeat import repeating_rms
 from mpam_calib.criticism.search import Search, Set
 
 Word = Literal["adequate", "named", "ambiguous", "unexplained"]
@@ -28,7 +28,7 @@ class Verdict:
     """The word, the leading set, and every set with its probability (best first).
 
     ``standing`` are the causes that hold even beside a remainder; ``size`` indexes the remainder's size
-    under the leading set.
+    under the leading set; ``repeating`` (N) is the fine structure that the strokes share.
     """
 
     word: Word
@@ -37,6 +37,7 @@ class Verdict:
     probabilities: dict[Set, float]
     marginals: dict[str, float]
     size: int
+    repeating: float = 0.0
 
 
 def judge(found: Search) -> Verdict:
@@ -49,13 +50,12 @@ def judge(found: Search) -> Verdict:
     marginals = {e: float(sum(w for s, w in probabilities.items() if e in s)) for e in found.tested}
     leading = sets[0]
     size = found.best_size(leading)
-    if (
-        found.problem.saturated > 0.0
-        or _structure_left(found, leading, size)
-        or _repeats(found, leading, size)
-    ):
+    problem = found.problem
+    repeating = _repeating(found, leading, size)
+    fine = repeating > REPEAT_SIZE * problem.noise_level.total
+    if problem.saturated > 0.0 or fine or _structure_left(found, leading, size):
         standing = _standing(found, leading)
-        return Verdict("unexplained", leading, standing, probabilities, marginals, size)
+        return Verdict("unexplained", leading, standing, probabilities, marginals, size, repeating)
     if not leading and probabilities[leading] > 0.5:
         return Verdict("adequate", leading, frozenset(), probabilities, marginals, size)
     lead = scores[0] - scores[1] if len(scores) > 1 else np.inf
@@ -80,13 +80,12 @@ def _structure_left(found: Search, leading: Set, size: int) -> bool:
     return remainder_rms(found.problem, held) > NOISE_SIZE * found.problem.noise_level.total
 
 
-def _repeats(found: Search, leading: Set, size: int) -> bool:
-    """Whether the strokes share a fine structure, above the noise, that the leading set leaves."""
-    problem = found.problem
-    if problem.rows is None:
-        return False
-    shared = repeating(problem.rows, problem.blueprint.model_dump_json(), found.fits[leading, size])
-    return shared > REPEAT_SIZE * problem.noise_level.total
+def _repeating(found: Search, leading: Set, size: int) -> float:
+    """Fine structure (N) that the strokes share and the leading set leaves."""
+    rows = found.problem.rows
+    if rows is None:
+        return 0.0
+    return repeating_rms(rows, found.problem.blueprint.model_dump_json(), found.fits[leading, size])
 
 
 def _standing(found: Search, leading: Set) -> Set:

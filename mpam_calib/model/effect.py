@@ -39,7 +39,8 @@ class Stage(IntEnum):
 class Effect:
     """One effect (see the module's docstring).
 
-    ``sentence`` is for a rig engineer; ``source`` names the equation's origin; ``parameters`` gives
+    ``sentence`` is for a rig engineer; ``source`` names the equation's origin; ``told_by``
+    the measurement that would show it by itself; ``parameters`` gives
     the priors for a setting; ``apply`` returns the changed state. ``forms`` are other shapes of
     the same thing with the same parameters, declared as ``id:form``. ``uses_force`` is set where it
     needs the muscle's own force (a fixture that gives way), which the chain then finds by fixed
@@ -57,6 +58,7 @@ class Effect:
     parameters: Callable[[Setting], tuple[Parameter, ...]]
     apply: Callable[[State, Values, Setting], State]
     forms: Mapping[str, Callable[[State, Values, Setting], State]] = field(default_factory=dict)
+    told_by: str = ""
     uses_force: bool = False
     needs_braid: bool = False
     bends: Mapping[str, int] = field(default_factory=dict)

@@ -58,6 +58,7 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
     ]
     sections = [
         Section("Misfit budget", _budget(found, content)),
+        Section("Where the misfit shows", _structure(content)),
         Section("Causes", _causes(causes)),
         Section("What else could it be", _alternatives(content)),
         Section("Gain on data the fit never saw", _gain(content)),
@@ -82,13 +83,47 @@ def _reasons(content: dict[str, Any]) -> list[str]:
         for c in content["causes"]
     ]
     if content["verdict"] == "unexplained":
-        reasons.append(f"structure of {significant(content['remainder_N'])} N is left beside every set tried")
+        reasons += _left(content)
     reasons += [
         f"{effect(c['id']).title} stays inside twice its declared uncertainty"
         for c in content["causes"]
         if c["within_declared_uncertainty"]
     ]
     return reasons
+
+
+def _left(content: dict[str, Any]) -> list[str]:
+    """What no set of causes removes."""
+    found = []
+    if content["saturated_share"] > 0.0:
+        share = significant(100.0 * content["saturated_share"])
+        found.append(f"the load cell saturates: {share} % of the readings are one and the same extreme value")
+    if content["repeating_N"] > 0.0:
+        size = significant(content["repeating_N"])
+        found.append(f"a fine structure of {size} N comes back in every stroke at the same place")
+    if content["remainder_N"] > 0.0 or not found:
+        size = significant(content["remainder_N"])
+        found.append(f"structure of {size} N is left beside every set tried")
+    return found
+
+
+def _structure(content: dict[str, Any]) -> list[Block]:
+    rows = [
+        {
+            "residuals against": row["against"],
+            "p before": row["p_before"],
+            "p after": row["p_after"],
+            "size before (N)": row["rms_before_N"],
+            "size after (N)": row["rms_after_N"],
+        }
+        for row in content["structure"]
+    ]
+    text = (
+        "Each row asks whether the residuals still depend on something. Without structure p is evenly spread "
+        "between 0 and 1; below 0.001 there is structure."
+    )
+    formats = dict.fromkeys(["p before", "p after", "size before (N)", "size after (N)"], "{:.2g}")
+    return [Text(text), DataTable(pd.DataFrame(rows), "Tests of structure, before and after", formats)]
 
 
 def _budget(found: Diagnosis, content: dict[str, Any]) -> list[Block]:
@@ -153,10 +188,18 @@ def _alternatives(content: dict[str, Any]) -> list[Block]:
         {
             "set": ", ".join(a["ids"]) or "nothing beyond the declared simulation",
             "probability": a["probability"],
+            "what would tell them apart": _telling(set(a["ids"]), {c["id"] for c in content["causes"]}),
         }
         for a in content["alternatives"]
     ]
     return [DataTable(pd.DataFrame(rows), "Other sets of causes", {"probability": "{:.3g}"})]
+
+
+def _telling(one: set[str], other: set[str]) -> str:
+    """The measurement for the first effect in which two sets differ: one that either set claims."""
+    return next(
+        (effect(e).told_by for e in [*sorted(one - other), *sorted(other - one)] if effect(e).told_by), ""
+    )
 
 
 def _gain(content: dict[str, Any]) -> list[Block]:
@@ -184,5 +227,8 @@ def _gain(content: dict[str, Any]) -> list[Block]:
 def _not_tested(content: dict[str, Any]) -> list[Block]:
     if not content["not_tested"]:
         return [Text("Every effect of the catalogue could be tested.")]
-    rows = [{"effect": effect(n["id"]).title, "why not": n["why"]} for n in content["not_tested"]]
+    rows = [
+        {"effect": effect(n["id"]).title, "why not": n["why"], "what would show it": effect(n["id"]).told_by}
+        for n in content["not_tested"]
+    ]
     return [DataTable(pd.DataFrame(rows), "Effects that these data are silent on", None)]

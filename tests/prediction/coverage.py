@@ -91,7 +91,7 @@ def posterior_draws(fold: Specimen, whole: Specimen, options: Options, seed: int
     rng = np.random.default_rng([seed, 1])
     mixture = laplace_mixture(modes)
     proposed = mixture.draw(PROPOSED, np.random.RandomState(seed), widen=1.2)
-    wide = StudentMixture(mixture.means, 1.2 * mixture.roots)
+    wide = StudentMixture(mixture.means, 1.2 * mixture.roots, mixture.shares)
     log_weight = evaluate(target, proposed) - wide.log_density(proposed)
     weight = np.exp(log_weight - log_weight.max())
     u = proposed[rng.choice(PROPOSED, DRAWS, p=weight / weight.sum())]

@@ -24,6 +24,7 @@ register(
         stage=Stage.SHAPE,
         title="Braid kinematics",
         sentence="the radius follows the strands of the sleeve, not the wall's constant thickness",
+        told_by="the outer diameter, measured along the stroke",
         source="thesis Eq. 2.10, 2.23 in place of Eq. 4.16",
         parameters=_parameters,
         apply=_apply,

@@ -27,6 +27,7 @@ register(
         stage=Stage.STATICS,
         title="Braid stretch",
         sentence="the strands stretch and store energy that the force then lacks",
+        told_by="blocked force at the highest pressures with a stiffer sleeve",
         source="thesis Eq. 2.25-2.26",
         parameters=_parameters,
         apply=_apply,

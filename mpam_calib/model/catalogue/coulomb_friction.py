@@ -31,6 +31,10 @@ register(
         stage=Stage.FRICTION,
         title="Coulomb friction",
         sentence="friction grows with the force: pulling out takes more than letting in",
+        told_by=(
+            "loops at low pressure and at low force: friction that follows the pressure stays, one "
+            "that follows the force goes"
+        ),
         source="thesis Eq. 2.44",
         parameters=_parameters,
         apply=_apply,

@@ -42,6 +42,7 @@ register(
         stage=Stage.RIG,
         title="Pressure dead-band",
         sentence="the first part of the pressure does no work (or the gauge has a zero offset)",
+        told_by="blocked force at low pressures, down to where the muscle stops pulling",
         source="thesis Eq. 2.45; Hocking & Wereley 2013",
         parameters=_parameters,
         apply=_apply,

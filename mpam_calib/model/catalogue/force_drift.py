@@ -28,6 +28,7 @@ register(
         stage=Stage.SENSOR,
         title="Force drift",
         sentence="the load cell's zero wanders while the test runs",
+        told_by="the load cell's reading without a muscle before, during and after the test",
         source="linear in time over the whole test",
         parameters=_parameters,
         apply=_apply,

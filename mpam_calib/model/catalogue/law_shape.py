@@ -50,6 +50,7 @@ register(
         stage=Stage.HISTORY,
         title="Law shape",
         sentence="the bladder's moduli change with pressure otherwise than the declared law",
+        told_by="loops at more pressure levels",
         source="bladder stress × (1 + Σ bend_j·Legendre polynomials in pressure beyond the law's)",
         parameters=_parameters,
         apply=_apply,

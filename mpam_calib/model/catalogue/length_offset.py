@@ -25,6 +25,7 @@ register(
         stage=Stage.RIG,
         title="Length offset",
         sentence="the crosshead was zeroed at another length than the muscle's rest length",
+        told_by="the crosshead's reading where the unpressurised muscle just goes taut",
         source="true shortening = reading + offset",
         parameters=_parameters,
         apply=_apply,

@@ -54,6 +54,7 @@ register(
         stage=Stage.STATICS,
         title="Order too low",
         sentence="the stress polynomial needs a higher order than declared",
+        told_by="a tensile test of the bladder up to the strains of the muscle",
         source="thesis Eq. 2.12 with M + 1 terms",
         parameters=_parameters,
         apply=_apply,

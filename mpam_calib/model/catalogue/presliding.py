@@ -36,6 +36,7 @@ register(
         stage=Stage.FRICTION,
         title="Presliding",
         sentence="after each turn the friction builds up over some travel instead of at once",
+        told_by="small reversals in the middle of the stroke",
         source="Dahl's model at constant load: s(1 − 2 exp(−travel/reversal))",
         parameters=_parameters,
         apply=_apply,

@@ -32,6 +32,7 @@ register(
         stage=Stage.FRICTION,
         title="Rate-dependent friction",
         sentence="the loop is wider when the crosshead moves faster",
+        told_by="the same loop at a third speed, ten times slower or faster",
         source="logarithmic in speed, relative to the geometric mean of the test's speeds",
         parameters=_parameters,
         apply=_apply,

@@ -27,6 +27,7 @@ register(
         stage=Stage.RIG,
         title="Rig compliance",
         sentence="the fixture gives: under load the muscle is shorter than the crosshead says",
+        told_by="a rigid bar in place of the muscle, loaded to the blocked force",
         source="true shortening = reading + compliance × force",
         parameters=_parameters,
         apply=_apply,

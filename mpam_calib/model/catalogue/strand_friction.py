@@ -31,6 +31,10 @@ register(
         stage=Stage.FRICTION,
         title="Strand friction",
         sentence="the strands rub on each other: friction follows pressure and contact, not force",
+        told_by=(
+            "loops at low pressure and at low force: friction that follows the pressure stays, one "
+            "that follows the force goes"
+        ),
         source="thesis Eq. 2.43 (empirical)",
         parameters=_parameters,
         apply=_apply,

@@ -36,6 +36,7 @@ register(
         stage=Stage.HISTORY,
         title="Stress softening",
         sentence="the bladder is stiffer in its first cycles and softens with use (Mullins)",
+        told_by="five more cycles at one level, and the first level again at the end",
         source="exponential in the cycle count: bladder stress × (1 + fraction·e^(1 − cycle))",
         parameters=_parameters,
         apply=_apply,

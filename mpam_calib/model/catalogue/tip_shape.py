@@ -28,6 +28,7 @@ register(
         stage=Stage.SHAPE,
         title="Tip shape",
         sentence="the ends are rounded: the working length is shorter than the muscle",
+        told_by="a second muscle of twice the length, or a photograph of the contracted ends",
         source="thesis Eq. 2.46-2.47",
         parameters=_parameters,
         apply=_apply,

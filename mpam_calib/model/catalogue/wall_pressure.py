@@ -23,6 +23,7 @@ register(
         stage=Stage.STATICS,
         title="Wall pressure",
         sentence="the wall carries the pressure through its thickness, so it costs less force than declared",
+        told_by="a second muscle with a thinner wall",
         source="thesis Eq. 2.9 (force balance, factor 0) against virtual work (factor 1)",
         parameters=_parameters,
         apply=_apply,

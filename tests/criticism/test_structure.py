@@ -1,0 +1,105 @@
+"""Tests of structure, fine structure that repeats, saturated cells: silent on noise, loud otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import stats
+
+from mpam_calib.criticism.fit import Fit, fit
+from mpam_calib.criticism.problem import Problem
+from mpam_calib.criticism.repeat import repeating_rms
+from mpam_calib.criticism.rows import saturated, without
+from mpam_calib.criticism.structure import structure_tests
+from mpam_calib.specimen import Specimen
+
+from .test_hypotheses import problem_of, specimen_of
+
+Array = NDArray[np.float64]
+NULLS = ("develop-null-000", "develop-null-001", "develop-null-003", "develop-null-007")
+
+
+@pytest.fixture(scope="module")
+def specimen() -> Specimen:
+    return specimen_of("develop-null-001")
+
+
+@pytest.fixture(scope="module")
+def null(specimen: Specimen) -> tuple[Problem, Fit]:
+    problem = problem_of(specimen)
+    return problem, fit(problem, frozenset(), 0)
+
+
+def test_p_values_are_spread_evenly_over_noise() -> None:
+    """Pure noise of the problem's own covariance on top of a fit: Kolmogorov-Smirnov over all tests."""
+    problem = problem_of(specimen_of("develop-null-001"))
+    base = fit(problem, frozenset(), 0)
+    root = np.linalg.cholesky(problem.noise)
+    rng = np.random.default_rng(1)
+    p_values: dict[str, list[float]] = {}
+    for _ in range(60):
+        noisy = replace(problem, force=base.force + root @ rng.standard_normal(len(problem)))
+        for test in structure_tests(noisy, fit(noisy, frozenset(), 0)):
+            p_values.setdefault(test.against, []).append(test.p_value)
+    assert len(p_values) == 7
+    for against, values in p_values.items():
+        assert stats.kstest(values, "uniform").pvalue > 1e-3, against
+
+
+@pytest.mark.parametrize(
+    ("against", "shape"),
+    [
+        ("contraction", lambda r: np.cos(3.0 * np.pi * r.displacement / r.displacement.max())),
+        ("branch", lambda r: r.sign),
+        ("time", lambda r: r.time / r.time.max()),
+        ("cycle", lambda r: 1.0 / r.cycle),
+    ],
+)
+def test_structure_fires_on_what_was_added(
+    null: tuple[Problem, Fit], against: str, shape: Callable[[object], Array]
+) -> None:
+    problem, fitted = null
+    added = problem.noise_level.total * shape(problem.middle())
+    found = {t.against: t for t in structure_tests(replace(problem, force=problem.force + added), fitted)}
+    assert found[against].p_value < 1e-6
+    quiet = {t.against: t for t in structure_tests(problem, fitted)}
+    assert quiet[against].p_value > 1e-4
+
+
+@pytest.mark.parametrize("name", NULLS)
+def test_noise_does_not_repeat(name: str) -> None:
+    problem = problem_of(specimen_of(name))
+    assert problem.rows is not None
+    fitted = fit(problem, frozenset(), 0)
+    assert repeating_rms(problem.rows, problem.blueprint.model_dump_json(), fitted) == 0.0
+
+
+def test_a_ripple_of_the_drive_repeats(null: tuple[Problem, Fit]) -> None:
+    """A ripple with the size of the noise, finer than the reduced rows, comes out with its size."""
+    problem, fitted = null
+    assert problem.rows is not None
+    x = problem.rows.readings.displacement
+    size = problem.noise_level.total
+    ripple = np.sqrt(2.0) * size * np.sin(2.0 * np.pi * 14.0 * x / x.max())
+    rows = replace(problem.rows, force=problem.rows.force + ripple)
+    found = repeating_rms(rows, problem.blueprint.model_dump_json(), fitted)
+    assert found == pytest.approx(size, rel=0.35)
+
+
+def test_a_saturated_cell_is_seen_and_left_out(specimen: Specimen) -> None:
+    loops = specimen.loops
+    assert loops is not None
+    assert not saturated(loops).any()
+    limit = float(np.quantile(loops.force_N, 0.97))
+    clipped = replace(loops, force_N=np.minimum(loops.force_N, limit))
+    found = saturated(clipped)
+    assert found.mean() == pytest.approx(0.03, abs=0.005)
+    assert np.all(clipped.force_N[found] == limit)
+    assert without(clipped, found).force_N.max() < limit
+    # A coarse converter repeats every value: that is no saturation.
+    step = 0.1 * float(np.ptp(loops.force_N)) / 2.0
+    assert not saturated(replace(loops, force_N=step * np.round(loops.force_N / step))).any()
