@@ -1,0 +1,111 @@
+"""Bent effects: the same cause at bend zero, a size that follows its driver otherwise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpam_calib.model.bend import BENDS, DRIVERS, MOST
+from mpam_calib.model.chain import Chain
+from mpam_calib.model.effect import Values, effect, known_effects
+from mpam_calib.model.effect_ids import EFFECT_FORMS
+from mpam_calib.model.readings import Readings
+from mpam_calib.model.state import Setting
+
+from . import build
+
+BENT = sorted(e for e in known_effects() if "bent" in EFFECT_FORMS.get(e, ()))
+
+
+def setting_for(form: str) -> Setting:
+    kinematics = "constant_thickness" if form.startswith("braid_kinematics") else "inextensible_braid"
+    friction = "strand" if form.startswith("coulomb") else "coulomb"
+    declared = {"law": "constant", "order": 2, "effects": (form,), "kinematics": kinematics}
+    setting = build.blueprint(declared | {"friction": friction}).setting()
+    assert setting is not None
+    return replace(setting, duration=100.0, level_time=40.0, speed=1e-3)
+
+
+def rows(setting: Setting, count: int = 40) -> Readings:
+    """Rows of one level whose time, cycle, travel and speed all vary."""
+    share = np.linspace(0.02, 0.98, count)
+    return Readings(
+        pressure=np.linspace(float(setting.levels[0]), setting.top_pressure, count),
+        displacement=share * setting.stroke,
+        sign=np.where(np.arange(count) % 2, 1.0, -1.0),
+        level=np.zeros(count, dtype=np.int64),
+        time=100.0 * share,
+        time_at_level=40.0 * share,
+        cycle=1.0 + np.arange(count) % 3,
+        travel=share * setting.stroke,
+        reversal=np.ones(count),
+        speed=1e-3 * 10.0 ** (2.0 * share - 1.0),
+    )
+
+
+def values_of(setting: Setting, form: str, u: float, bends: float) -> Values:
+    declared = {"K_f": np.array([[0.05]]), "f_s": np.array([[0.1]])}
+    own = {
+        p.name: p.prior.from_normal(np.full((1, 1), bends if BENDS in p.name else u))
+        for p in effect(form).parameters(setting)
+    }
+    return declared | own
+
+
+def force_of(form: str, u: float, bends: float) -> np.ndarray:
+    setting = setting_for(form)
+    force = Chain(setting, None, False).force(
+        values_of(setting, form, u, bends), np.zeros((1, 0)), rows(setting)
+    )
+    return np.broadcast_to(force, (1, 40))[0]
+
+
+@pytest.mark.parametrize("identifier", BENT)
+def test_a_straight_bend_is_the_plain_effect(identifier: str) -> None:
+    plain, bent = force_of(identifier, 0.7, 0.0), force_of(f"{identifier}:bent", 0.7, 0.0)
+    assert bent == pytest.approx(plain, rel=1e-12, abs=1e-9)
+    if identifier == "stress_softening":
+        return  # it acts on the bladder, and there is none here
+    moved = force_of(f"{identifier}:bent", 0.7, 1.0)
+    assert np.max(np.abs(moved - plain)) > 1e-3 * np.max(np.abs(plain - force_of(identifier, -7.0, 0.0)))
+
+
+def test_the_size_follows_the_driver() -> None:
+    """An offset that grows along the stroke and fades in time: every row has its own."""
+    form = "length_offset:bent"
+    setting = setting_for(form)
+    readings = rows(setting)
+    values = dict(values_of(setting, form, 0.0, 0.0))
+    values |= {
+        "offset_mm": np.array([[1e-3]]),
+        "offset_mm_bend_1": np.array([[0.4]]),
+        "offset_mm_bend_2": np.array([[-0.3]]),
+    }
+    bent = Chain(setting, None, False).force(values, np.zeros((1, 0)), readings)[0]
+    along = 2.0 * readings.displacement / setting.stroke - 1.0
+    in_time = 2.0 * readings.time / setting.duration - 1.0
+    local = 1e-3 * np.exp(0.4 * along - 0.3 * in_time)
+    plain = replace(setting, simulation=setting.simulation.model_copy(update={"effects": ()}))
+    shifted = replace(readings, displacement=readings.displacement + local)
+    expected = Chain(plain, None, False).force(values, np.zeros((1, 0)), shifted)[0]
+    assert bent == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("identifier", BENT)
+def test_factors_stay_positive_and_bounded(identifier: str) -> None:
+    """However far the coefficients go, the sign of an effect stays: e^±MOST are the limits."""
+    assert set(effect(identifier).bends) <= set(DRIVERS)
+    assert 0.0 < np.exp(-MOST) < 1.0 < np.exp(MOST) < 10.0
+    far = force_of(f"{identifier}:bent", 0.3, 50.0)
+    assert np.all(np.isfinite(far))
+
+
+def test_kinds_bend_too() -> None:
+    assert effect("stress_softening:force-bent").id == "stress_softening:force-bent"
+    assert force_of("stress_softening:force-bent", 0.5, 0.0) == pytest.approx(
+        force_of("stress_softening:force", 0.5, 0.0), rel=1e-12
+    )
+    with pytest.raises(KeyError):
+        effect("creep:nonsense")
