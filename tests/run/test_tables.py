@@ -133,7 +133,7 @@ def test_the_report_is_one_self_contained_page(muscle_run: Path, bands: pd.DataF
     assert [link for link in outside if not link.startswith("data:")] == []
     assert not re.search(r"@import|url\((?!['\"]?data:)", page)
     blocked = bands[(bands["quantity"] == "blocked_force_N") & (bands["pressure_kPa"] == max(LEVELS))]
-    assert f"{blocked['mean'].iloc[0]:.0f}" in page
+    assert f"{blocked['mean'].iloc[0]:.3g}" in page
 
 
 def test_predictions_at_any_pressures(run_copy: Path, bands: pd.DataFrame, here: Here) -> None:
