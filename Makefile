@@ -9,7 +9,7 @@ export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help calibrate test test-long score benchmark lint sample clean
+.PHONY: help calibrate test test-long score benchmark diagnose lint sample clean
 
 help:
 	@echo "make calibrate   calibrate the bundled data sets; reports in reports/*/report.html"
@@ -17,6 +17,7 @@ help:
 	@echo "make test-long   statistical tests of several minutes"
 	@echo "make score       score diagnose on the locked hidden cases (resumable; SET=develop for the others)"
 	@echo "make benchmark   times the sampler beside nutpie and PyMC, in an environment of its own"
+	@echo "make diagnose    diagnose the bundled data sets; table in reports/diagnosed.md"
 	@echo "make lint        linters and types alone"
 	@echo "make sample      make $(SAMPLE) again (the picture needs chromium)"
 	@echo "make clean       remove the virtual environment, reports and caches"
@@ -53,6 +54,10 @@ $(BENCHMARKS)/.installed: pyproject.toml tests/benchmarks/requirements.txt
 
 benchmark: $(BENCHMARKS)/.installed
 	@cd tests && ../$(BENCHMARKS)/bin/python -W ignore -m benchmarks
+
+diagnose: $(VENV)/.installed
+	mkdir -p reports
+	$(BIN)/python datasets/diagnose_all.py reports/diagnosed.md
 
 lint: $(VENV)/.installed
 	$(BIN)/ruff check .

@@ -177,7 +177,7 @@ def search(
     singles = [next(iter(s)) for s in _keep(found, 1, PARTNERS)]
     for k in range(2, LARGEST + 1):
         tries = {s | {p} for s in kept for p in _partners(found, s, singles) if p not in s}
-        if k == 2:
+        if k == 2 and width >= WIDTH:
             # Small causes show only beside each other: all pairs are worth a look.
             for pair in map(frozenset, combinations(tested, 2)):
                 _try(found, pair, (0,))

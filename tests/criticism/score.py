@@ -11,6 +11,7 @@ import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -166,6 +167,16 @@ def rates(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
     ]
 
 
+def calibration(scored: list[Scored]) -> list[tuple[float, float, int, int]]:
+    """Stated probability of the leading set against how often it is the truth: (from, to, hits, cases)."""
+    clean = [s for s in scored if not s.outside and s.listed]
+    table = []
+    for low, high in pairwise((0.0, 0.5, 0.8, 0.95, 0.99, 1.0)):
+        here = [s for s in clean if low < s.probability <= high]
+        table.append((low, high, sum(s.listed[0] == s.truth for s in here), len(here)))
+    return table
+
+
 def main(which: str, shard: int = 0, shards: int = 1, workers: int = 2) -> None:
     """Score what is not scored yet, then print the rates of all that is."""
     path = Path(__file__).parents[2] / "reports" / f"score_{which}.csv"
@@ -186,6 +197,9 @@ def main(which: str, shard: int = 0, shards: int = 1, workers: int = 2) -> None:
         low, high = wilson(hits, of)
         share = hits / of if of else float("nan")
         print(f"{what:<40} {hits:>4} of {of:<4} {share:6.1%}  ({low:.1%} to {high:.1%})")
+    print("stated probability of the leading set, and how often it is the truth")
+    for low, high, hits, of in calibration(everything):
+        print(f"  {low:.2f} to {high:.2f}: {hits:>4} of {of}")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,84 @@
+"""What the simulations get wrong on the bundled data, as a table (``make diagnose``).
+
+    python datasets/diagnose_all.py OUTPUT.md
+
+The two muscles reconstructed from the thesis are diagnosed twice: as an inextensible braid with the moduli
+of the thesis's tensile tests (Table 4.1) and no corrections, and as the thesis's own simulation; the measured
+Festo muscles and the pneumatic cylinder as they are declared.
+"""
+
+from __future__ import annotations
+
+import csv
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from mpam_calib.criticism.diagnose import describe, diagnose
+from mpam_calib.specimen import read
+
+HERE = Path(__file__).resolve().parent
+BARE = """
+[simulation]
+kinematics = "inextensible_braid"
+strain = "engineering"
+friction = "none"
+effects = []
+moduli = "tensile"
+law = "constant"
+E_Pa = [{moduli}]
+E_rel_sd = 0.1
+order = {order}
+"""
+MUSCLES = ("mpam1_reconstructed", "mpam2_reconstructed")
+AS_DECLARED = (*MUSCLES, "festo_dmsp10", "festo_dmsp20", "cylinder_zillen")
+
+
+def bare(name: str, folder: Path) -> Path:
+    """A copy of a muscle's specimen that declares an inextensible braid with Table 4.1's moduli."""
+    shutil.copytree(HERE / name, folder)
+    with (HERE / "thesis_tables" / "table_4_1.csv").open() as file:
+        moduli = [row["Value (Pa)"] for row in csv.DictReader(file)]
+    text = (HERE / name / "specimen.toml").read_text()
+    declared = BARE.format(moduli=", ".join(moduli), order=len(moduli))
+    (folder / "specimen.toml").write_text(text[: text.index("[simulation]")] + declared)
+    return folder
+
+
+def row(title: str, content: dict[str, Any]) -> str:
+    """One line of the table."""
+    causes = []
+    for cause in content["causes"]:
+        sizes = ", ".join(f"{n} {v['q05']:.3g} to {v['q95']:.3g}" for n, v in cause["parameters"].items())
+        causes.append(f"{cause['id']} (p {cause['probability']:.2f}{'; ' + sizes if sizes else ''})")
+    others = [" + ".join(a["ids"]) or "nothing" for a in content["alternatives"][:3]]
+    held = "–"
+    if (gain := content["gain"]) is not None:
+        error = f"{gain['rmse_before_N']:.2f} → {gain['rmse_after_N']:.2f} N"
+        coverage = f"coverage {gain['coverage90_before']:.2f} → {gain['coverage90_after']:.2f}"
+        held = f"{error}; {coverage}; same set in {gain['folds_same_set']} of {gain['folds']}"
+    before, after, noise = (content[k] for k in ("misfit_before_N", "misfit_after_N", "noise_N"))
+    size = f"{before:.2f} → {after:.2f} (noise {noise:.2f})"
+    cells = (title, content["verdict"], "; ".join(causes) or "–", "; ".join(others), size, held)
+    return f"| {' | '.join(cells)} |"
+
+
+def main(target: Path) -> None:
+    """Diagnose everything and write the table."""
+    lines = [
+        "| data | verdict | causes | other sets, most probable first | misfit (N) | held out |",
+        "|---|---|---|---|---|---|",
+    ]
+    with tempfile.TemporaryDirectory() as place:
+        jobs = [(f"{name}, bare braid", bare(name, Path(place) / name)) for name in MUSCLES]
+        jobs += [(f"{name}, as declared", HERE / name) for name in AS_DECLARED]
+        for title, folder in jobs:
+            print(title, flush=True)
+            lines.append(row(title, describe(diagnose(read(folder)), 0)))
+    target.write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
