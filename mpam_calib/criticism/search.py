@@ -6,6 +6,7 @@ as the average catalogue has it: a set of k out of n effects has prior ∝ RATE^
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -14,6 +15,7 @@ from math import comb, log
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
@@ -110,7 +112,10 @@ class Search:
         self, best: Fit | None, choice: dict[str, str], size: int, start: dict[str, float]
     ) -> Fit | None:
         try:
-            found = fit(self.problem, frozenset(choice.values()), size, start)
+            with warnings.catch_warnings():
+                # On its way a climb may pass through shapes that no muscle has.
+                warnings.simplefilter("ignore", linalg.LinAlgWarning)
+                found = fit(self.problem, frozenset(choice.values()), size, start)
         except np.linalg.LinAlgError:
             return best
         paid = sum(log(len(forms_of(e))) for e in choice)
