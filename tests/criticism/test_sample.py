@@ -5,21 +5,27 @@ The rates to quote come from the whole sets (``make score``).
 
 from __future__ import annotations
 
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
 import pytest
 from rig import sets
 
 from criticism.score import Scored, score_case
 
-STRIDES = {"null": 12, "separable": 6, "outside": 7}
+STRIDES = {"null": 12, "separable": 9, "outside": 7}
 
 
 @pytest.fixture(scope="module")
 def scored() -> dict[str, list[Scored]]:
-    groups: dict[str, list[Scored]] = {}
-    for group, stride in STRIDES.items():
-        chosen = [recipe for recipe in sets.recipes("develop") if recipe.group == group][::stride]
-        groups[group] = [score_case(recipe) for recipe in chosen]
-    return groups
+    chosen = [
+        recipe
+        for group, stride in STRIDES.items()
+        for recipe in [r for r in sets.recipes("develop") if r.group == group][::stride]
+    ]
+    with ProcessPoolExecutor(2, mp_context=get_context("fork")) as pool:
+        found = list(pool.map(score_case, chosen))
+    return {group: [case for case in found if case.group == group] for group in STRIDES}
 
 
 def test_nothing_is_named_where_nothing_is_hidden(scored: dict[str, list[Scored]]) -> None:
@@ -28,9 +34,9 @@ def test_nothing_is_named_where_nothing_is_hidden(scored: dict[str, list[Scored]
 
 def test_hidden_causes_lead_and_wrong_names_are_rare(scored: dict[str, list[Scored]]) -> None:
     cases = scored["separable"]
-    first = sum(case.listed[0] == case.truth for case in cases)
+    first = sum(case.listed[:1] == (case.truth,) for case in cases)
     wrong = sum(case.word == "named" and case.named != case.truth for case in cases)
-    assert first >= 4, [(case.name, case.word, sorted(case.listed[0])) for case in cases]
+    assert first >= 3, [(case.name, case.word, sorted(case.named)) for case in cases]
     assert wrong <= 1
 
 
