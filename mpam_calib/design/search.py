@@ -32,6 +32,8 @@ POPULATION, GENERATIONS = 12, 60
 """Individuals for each variable, and generations at most."""
 ITERATIONS = (200, 500)
 """Iterations of SQP and of interior point at most."""
+AT_BOUND = 1e-9
+"""A scaled variable this close to 0 or 1 lies on its bound."""
 RESTORATIONS = 3
 """Newton steps back onto a constraint that SQP overstepped by rounding."""
 BARRIER = 1e-10
@@ -205,6 +207,9 @@ def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float
             for g, slope in constraints:
                 short = min(float(g(result.x)), 0.0)
                 direction = np.ravel(slope(result.x))
+                inside = (result.x > AT_BOUND) & (result.x < 1.0 - AT_BOUND)
+                # What lies on its bound is best left there, as long as something else can move.
+                direction = np.where(inside, direction, 0.0) if np.any(direction[inside]) else direction
                 result.x = np.clip(result.x - short * direction / (direction @ direction), 0.0, 1.0)
     else:
         result = _minimize(
