@@ -17,7 +17,7 @@ from .command import PATIENCE, Result, all_gone, contents, finish, kill, living,
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="signals and /proc as Linux has them")
 
 MANY_BLOCKS = ("--no-correlated-noise", "--no-remainder", "--ess", 1e6, "--max-steps", 640)
-"""Sixteen blocks: they stop at the budget, so that every run has as many, and last long enough to be killed."""
+"""Sixteen blocks: they stop at the budget, so that every run has as many, and last until they are killed."""
 TABLES = ("summary.csv", "bands.csv", "run.json")
 
 
