@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from mpam_calib.criticism.problem import SIZES, Problem
+from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.bend import BENDS
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.chain import Chain
@@ -180,8 +180,3 @@ def _nudged(guide: Array, copies: int, nudge: float) -> Array:
     rows = np.repeat(guide[None, :], copies, axis=0)
     rows[-1] += nudge
     return rows
-
-
-def sizes_in_play() -> range:
-    """Indices of the remainder's sizes."""
-    return range(len(SIZES))

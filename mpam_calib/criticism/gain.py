@@ -82,7 +82,10 @@ def _fold(task: tuple[Problem, tuple[str, ...], NDArray[np.bool_]]) -> _Fold:
     problem, tested, held = task
     train = problem.take(~held)
     found = search(train, tested, width=FOLD_WIDTH)
-    chosen = judge(found).leading
+    # What a verdict on these rows alone would report: in "unexplained", only what stands even so.
+    chosen = judge(found).standing
+    for size in range(len(SIZES)):
+        found.refit(chosen, size)
     index = (np.flatnonzero(~held), np.flatnonzero(held))
     results = [_predict(problem, found, effects, index) for effects in (frozenset(), chosen)]
     force = problem.force[held]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from itertools import combinations
 from math import comb, log
 
@@ -19,7 +18,7 @@ from scipy import linalg
 
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
-from mpam_calib.model.bend import BENDS, FORM
+from mpam_calib.model.bend import BENDS
 from mpam_calib.model.effect import effect
 
 Array = NDArray[np.float64]
@@ -223,17 +222,12 @@ def _try(found: Search, effects: Set, sizes: Iterable[int], curved: bool = False
 
 def flexible(identifier: str) -> tuple[str, ...]:
     """The forms that hold most shapes of an effect, one of every kind."""
-    item = effect(identifier)
-    if not item.bends:
-        return (identifier,)
-    return (f"{identifier}:{FORM}", *(f"{identifier}:{kind}-{FORM}" for kind in item.kinds))
+    return tuple(f"{identifier}:{form}" for form in effect(identifier).bent_forms) or (identifier,)
 
 
-@lru_cache
 def forms_of(identifier: str) -> tuple[str, ...]:
     """The effect's id as it is, and with each of its other forms."""
-    forms = tuple(f"{identifier}:{form}" for form in effect(identifier).forms)
-    return tuple(dict.fromkeys((identifier, *forms, *flexible(identifier))))
+    return (identifier, *(f"{identifier}:{form}" for form in effect(identifier).all_forms))
 
 
 def _own_names(problem: Problem, effects: Set) -> list[str]:

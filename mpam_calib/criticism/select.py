@@ -118,7 +118,7 @@ def select(
     listener = tell or (lambda stage, share: None)
     blueprint = draw_blueprint(specimen, Options(nuisances=False, remainder=False), material)
     problem = build_problem(specimen, blueprint)
-    problem.axes  # noqa: B018 - computed once, before the workers are forked
+    assert len(problem.axes[1]) == len(problem.bow)  # both are there before the workers are forked
     space = model_space(specimen)
     ranked: list[_Ranked] = []
     with ProcessPoolExecutor(

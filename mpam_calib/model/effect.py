@@ -64,6 +64,16 @@ class Effect:
     bends: Mapping[str, int] = field(default_factory=dict)
     kinds: tuple[str, ...] = ()
 
+    @property
+    def bent_forms(self) -> tuple[str, ...]:
+        """The forms that bend, one of every kind."""
+        return (FORM, *(f"{kind}-{FORM}" for kind in self.kinds)) if self.bends else ()
+
+    @property
+    def all_forms(self) -> tuple[str, ...]:
+        """Every form besides its own."""
+        return (*self.forms, *self.bent_forms)
+
 
 _REGISTRY: dict[str, Effect] = {}
 
@@ -73,7 +83,7 @@ def register(effect: Effect) -> Effect:
     if effect.id in _REGISTRY:
         raise ValueError(f"an effect with the id {effect.id!r} is registered already")
     _REGISTRY[effect.id] = effect
-    add_effect_id(effect.id)
+    add_effect_id(effect.id, effect.all_forms)
     return effect
 
 
@@ -87,10 +97,10 @@ def effect(identifier: str) -> Effect:
     plain = form.removesuffix(FORM).removesuffix("-")
     if plain:
         found = replace(found, apply=found.forms[plain])
-    return replace(found if plain == form else _bent(found), id=identifier)
+    return replace(found if plain == form else bent(found), id=identifier)
 
 
-def _bent(item: Effect) -> Effect:
+def bent(item: Effect) -> Effect:
     """The effect with a size that varies smoothly along its drivers."""
 
     def parameters(setting: Setting) -> tuple[Parameter, ...]:

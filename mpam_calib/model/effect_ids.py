@@ -39,14 +39,19 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
 OUTSIDE: Final = "mpam_calib.effects"
 """Entry-point group under which another package names a module that registers effects on import."""
 
-_added: list[str] = []
+_added: dict[str, tuple[str, ...]] = {}
 _asked: list[str] = []
 
 
-def add_effect_id(effect_id: str) -> None:
-    """Let specimen files declare ``effect_id`` too: for an effect that is registered from outside."""
-    if effect_id not in (*EFFECT_IDS, *_added):
-        _added.append(effect_id)
+def add_effect_id(effect_id: str, forms: tuple[str, ...] = ()) -> None:
+    """Let specimen files declare ``effect_id`` and its forms: for an effect registered from outside."""
+    if effect_id not in EFFECT_IDS:
+        _added.setdefault(effect_id, forms)
+
+
+def forms_of_id(effect_id: str) -> tuple[str, ...]:
+    """The forms in which ``effect_id`` may be declared besides its own."""
+    return EFFECT_FORMS.get(effect_id) or _added.get(effect_id, ())
 
 
 def load_outside_effects() -> None:

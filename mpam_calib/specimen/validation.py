@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from mpam_calib.errors import InputError
-from mpam_calib.model.effect_ids import EFFECT_FORMS, known_effect_ids
+from mpam_calib.model.effect_ids import forms_of_id, known_effect_ids
 from mpam_calib.specimen.declaration import Declaration, FileKind
 from mpam_calib.specimen.tables import TABLES
 from mpam_calib.specimen.toml_source import TomlSource
@@ -143,7 +143,7 @@ def _check_effects(source: TomlSource, declaration: Declaration) -> None:
     keys = ["simulation", "effects"]
     effects = declaration.simulation.effect_ids
     for effect, written in zip(effects, declaration.simulation.effects, strict=True):
-        forms = EFFECT_FORMS.get(effect, ())
+        forms = forms_of_id(effect)
         form = written.partition(":")[2]
         if effect in known and ":" in written and form not in forms:
             found = f"{quoted(written)}{did_you_mean(form, forms)}"

@@ -17,7 +17,6 @@ from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.effect import effect, known_effects
-from mpam_calib.model.effect_ids import EFFECT_FORMS
 from mpam_calib.specimen import Specimen, read
 
 
@@ -91,7 +90,7 @@ def test_forms_are_silent_at_size_zero(null_problem: Problem) -> None:
             item.needs_braid and null_problem.blueprint.braid is None
         ):
             continue
-        for form in (identifier, *(f"{identifier}:{name}" for name in EFFECT_FORMS[identifier])):
+        for form in (identifier, *(f"{identifier}:{name}" for name in item.all_forms)):
             simulation = null_problem.blueprint.simulation.model_copy(update={"effects": (form,)})
             blueprint = null_problem.blueprint.model_copy(update={"simulation": simulation})
             changed = blueprint.setting()

@@ -9,14 +9,14 @@ import pytest
 
 from mpam_calib.model.bend import BENDS, DRIVERS, MOST
 from mpam_calib.model.chain import Chain
-from mpam_calib.model.effect import Values, effect, known_effects
-from mpam_calib.model.effect_ids import EFFECT_FORMS
+from mpam_calib.model.effect import Values, bent, effect, known_effects
+from mpam_calib.model.effect_ids import forms_of_id
 from mpam_calib.model.readings import Readings
-from mpam_calib.model.state import Setting
+from mpam_calib.model.state import Setting, State
 
 from . import build
 
-BENT = sorted(e for e in known_effects() if "bent" in EFFECT_FORMS.get(e, ()))
+BENT = sorted(e for e in known_effects() if effect(e).bends)
 
 
 def setting_for(form: str) -> Setting:
@@ -93,13 +93,30 @@ def test_the_size_follows_the_driver() -> None:
     assert bent == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("identifier", BENT)
-def test_factors_stay_positive_and_bounded(identifier: str) -> None:
-    """However far the coefficients go, the sign of an effect stays: e^±MOST are the limits."""
-    assert set(effect(identifier).bends) <= set(DRIVERS)
-    assert 0.0 < np.exp(-MOST) < 1.0 < np.exp(MOST) < 10.0
-    far = force_of(f"{identifier}:bent", 0.3, 50.0)
-    assert np.all(np.isfinite(far))
+@pytest.mark.parametrize("bends", [-50.0, 50.0])
+def test_an_effect_never_turns_round(bends: float) -> None:
+    """However far the coefficients go, the local size keeps its sign and stays within e^±MOST of its own."""
+    form = "length_offset:bent"
+    setting = setting_for(form)
+    given = dict(values_of(setting, form, 0.0, bends)) | {"offset_mm": np.array([[1e-3]])}
+    seen: list[np.ndarray] = []
+
+    def watch(state: State, values: Values, where: Setting) -> State:
+        seen.append(np.asarray(values["offset_mm"]))
+        return state
+
+    item = replace(effect("length_offset"), apply=watch)
+    bent(item).apply(Chain(setting, None, False)._start(rows(setting), np.zeros(1)), given, setting)
+    local = seen[0] / 1e-3
+    assert local.min() >= np.exp(-MOST) - 1e-12 and local.max() <= np.exp(MOST) + 1e-12
+    assert local.min() < 1.0 < local.max()
+
+
+def test_the_list_of_forms_is_that_of_the_effects() -> None:
+    """Specimen files are checked against a list that does not import the effects: it must be theirs."""
+    for identifier in known_effects():
+        assert set(forms_of_id(identifier)) == set(effect(identifier).all_forms), identifier
+    assert all(set(effect(identifier).bends) <= set(DRIVERS) for identifier in known_effects())
 
 
 def test_kinds_bend_too() -> None:

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mpam_calib.errors import InputError
 from mpam_calib.model import effect as registry
 from mpam_calib.model import effect_ids
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.effect import Effect, Stage, effect, known_effects, register
 from mpam_calib.model.priors import Normal, Parameter
 from mpam_calib.posterior.target import build_target, locate, predict_force
+from mpam_calib.specimen import read
 
 from . import build
 
+DATASETS = Path(__file__).parents[2] / "datasets"
 IDENTIFIER = "temperature_zero"
 SWING = 0.8
 
@@ -40,13 +45,13 @@ def outside() -> Iterator[Effect]:
             source="a test",
             parameters=_parameters,
             apply=_apply,
+            bends={"swing_N": 1},
         )
     )
-    effect_ids.add_effect_id(IDENTIFIER)
     yield made
     # There is no call for this: an effect stays for as long as the process does.
     del registry._REGISTRY[IDENTIFIER]
-    effect_ids._added.remove(IDENTIFIER)
+    del effect_ids._added[IDENTIFIER]
 
 
 def test_it_is_known(outside):
@@ -61,6 +66,20 @@ def test_an_id_can_be_taken_only_once(outside):
         register(outside)
     effect_ids.add_effect_id(IDENTIFIER)
     assert effect_ids.known_effect_ids().count(IDENTIFIER) == 1
+
+
+@pytest.mark.parametrize(("form", "refused"), [("bent", False), ("soft", True)])
+def test_its_forms_may_be_declared(outside, tmp_path, form, refused):
+    """`diagnose` writes such a form into the extended specimen: reading it back must work."""
+    folder = tmp_path / "mpam1"
+    shutil.copytree(DATASETS / "mpam1_reconstructed", folder)
+    toml = folder / "specimen.toml"
+    toml.write_text(toml.read_text().replace('["dead_band"]', f'["{IDENTIFIER}:{form}"]'))
+    if refused:
+        with pytest.raises(InputError, match="bent"):
+            read(folder)
+    else:
+        assert list(read(folder).simulation.effects) == [f"{IDENTIFIER}:{form}"]
 
 
 def test_it_calibrates(outside):
