@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.criticism.fit import FURTHEST, Fit, chain_for
+from mpam_calib.criticism.climb import FURTHEST
+from mpam_calib.criticism.fit import Fit, chain_for
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.chain import Chain

@@ -59,8 +59,10 @@ class Search:
         if near is not None and len(effects) > 1:
             tries = [(_forms(near), _ended(near))]
         elif len(effects) > 1:
+            # From where the best part ended, and from nothing: a part may have ended in a shape that only
+            # made up for what it lacked.
             choice, start = self._from_parts(effects, size)
-            tries = [(choice, start), *((choice, s) for s in starts)]
+            tries = [(choice, start), *(({e: flexible(e)[0] for e in effects} | choice, s) for s in starts)]
         else:
             tries = [({e: form}, s) for e in effects for form in flexible(e) for s in starts] or [({}, {})]
         best: Fit | None = None
@@ -262,6 +264,6 @@ def _gain(found: Search, effects: Set, partner: str, size: int) -> float:
         return -np.inf
     axes, spread = found.problem.axes[0], found.problem.spreads[size]
     signature = axes @ (single.force - nothing.force) / spread
-    residual = axes @ (found.problem.force - base.force) / spread
+    residual = axes @ (found.problem.force - base.force - base.doubt) / spread
     power = float(signature @ signature)
     return 0.5 * float(signature @ residual) ** 2 / power if power > 1e-12 else 0.0

@@ -126,7 +126,7 @@ class Chain:
         return force
 
     def _to_shape(self, values: Values, readings: Readings, guide: Array) -> tuple[State, Shape]:
-        state = self._start(readings, guide)
+        state = self.start(readings, guide)
         if self.with_nuisances:
             state = apply_nuisances(state, values)
         state = self._stage(Stage.RIG, state, values)
@@ -170,7 +170,8 @@ class Chain:
                 state = item.apply(state, values, self.setting)
         return state
 
-    def _start(self, readings: Readings, guide: Array) -> State:
+    def start(self, readings: Readings, guide: Array) -> State:
+        """The state before any stage: the recording as it is, nothing corrected."""
         zero, one = np.zeros((1, 1)), np.ones((1, 1))
         geometry = self.setting.geometry
         return State(

@@ -106,7 +106,7 @@ def test_an_effect_never_turns_round(bends: float) -> None:
         return state
 
     item = replace(effect("length_offset"), apply=watch)
-    bent(item).apply(Chain(setting, None, False)._start(rows(setting), np.zeros(1)), given, setting)
+    bent(item).apply(Chain(setting, None, False).start(rows(setting), np.zeros(1)), given, setting)
     local = seen[0] / 1e-3
     assert local.min() >= np.exp(-MOST) - 1e-12 and local.max() <= np.exp(MOST) + 1e-12
     assert local.min() < 1.0 < local.max()
