@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from mpam_calib.criticism.climb import Climb
 from mpam_calib.criticism import doubt
+from mpam_calib.criticism.climb import Climb
 from mpam_calib.criticism.doubt import doubts
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.blueprint import Blueprint

@@ -138,7 +138,7 @@ def predict_rows(
 
 
 def linearise(problem: Problem, fitted: Fit, blueprint: Blueprint | None = None) -> tuple[Array, Array]:
-    """Force (n,) with the doubt's part, and its Jacobian (n, d + p + r), at a fit on all rows of a problem."""
+    """Force (n,), the doubt's part in it, and Jacobian (n, d + p + r) at a fit, on all rows of a problem."""
     key = (blueprint or problem.blueprint).model_dump_json()
     chain = chain_for(key, fitted.effects)
     n, d = len(problem), len(fitted.u)

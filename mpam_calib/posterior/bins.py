@@ -227,21 +227,32 @@ def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Ar
     opposite = np.zeros(len(first), dtype=bool)
     opposite[1:] = loops.branch[first][1:] == -loops.branch[first][:-1]
     last = first + lengths - 1
-    duration = np.maximum(loops.time_s[last] - loops.time_s[first], 1e-9)
-    # Net travel over time: encoder noise would inflate a sum of steps.
-    speed = np.abs(loops.displacement_m[last] - loops.displacement_m[first]) / duration
-    # The turn lies between two readings: what is left of a step was travelled on either side of it.
-    step = speed * duration / np.maximum(lengths - 1, 1)
-    before = np.concatenate([[0.0], loops.displacement_m[last][:-1]])
-    back = loops.displacement_m[first] - before
     direction = np.sign(loops.displacement_m[last] - loops.displacement_m[first])
-    since_turn = np.where(same_level & opposite, 0.5 * (step + direction * back), 0.5 * step)
-    since_turn = np.clip(since_turn, 0.0, step)
+    turned = same_level & opposite
+    # The turn lies between two readings: what was travelled between them lies on either side of it.
+    after = _half_step(loops.displacement_m, first, np.minimum(first + 2, last), direction)
+    before = _half_step(loops.displacement_m, last, np.maximum(last - 2, first), -direction)
+    before = np.where(turned, np.concatenate([[0.0], before[:-1]]), after)
+    came_from = np.concatenate([[0.0], loops.displacement_m[last][:-1]])
+    back = np.where(turned, direction * (loops.displacement_m[first] - came_from), 0.0)
+    since_turn = np.clip(0.5 * (after + before + back), 0.0, after + before)
     travel = since_turn[segment] + np.abs(loops.displacement_m - loops.displacement_m[first][segment])
     run = np.cumsum(~same_level) - 1
     level_start = loops.time_s[first][~same_level]
     at_level = loops.time_s - level_start[run][segment]
     return travel, (same_level & opposite).astype(np.float64), at_level
+
+
+def _half_step(displacement: Array, end: Ints, inner: Ints, direction: Array) -> Array:
+    """Way (strokes,) travelled in the half step beyond the row ``end`` of each stroke, m.
+
+    The speed there goes on changing as it did over the two steps to the row ``inner``: a crosshead that comes
+    to rest gently travels less than one that turns at full speed.
+    """
+    middle = (end + inner) // 2
+    near = direction * (displacement[middle] - displacement[end])
+    far = direction * (displacement[inner] - displacement[middle])
+    return np.asarray(0.5 * np.clip(near + 0.75 * (near - far), 0.0, np.maximum(far, near)))
 
 
 def _speed(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array, NDArray[np.bool_]]:
@@ -252,8 +263,19 @@ def _speed(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array,
     rows = np.arange(len(segment))
     window = np.maximum((last - first + 1) // 40, 1)[segment]
     before, after = np.maximum(rows - window, first[segment]), np.minimum(rows + window, last[segment])
-    elapsed = np.maximum(loops.time_s[after] - loops.time_s[before], 1e-9)
-    local = np.abs(loops.displacement_m[after] - loops.displacement_m[before]) / elapsed
+
+    def between(one: Ints, other: Ints) -> Array:
+        elapsed = np.maximum(np.abs(loops.time_s[other] - loops.time_s[one]), 1e-9)
+        return np.asarray(np.abs(loops.displacement_m[other] - loops.displacement_m[one]) / elapsed)
+
+    local = between(before, after)
+    # Next to a turn only one side is known: the speed there is not the mean of what follows.
+    inward = np.where(rows - first[segment] < window, 1, np.where(last[segment] - rows < window, -1, 0))
+    reach = np.minimum(window, (last - first)[segment] // 2)
+    one, two = rows + inward * reach, rows + 2 * inward * reach
+    edge = (inward != 0) & (reach > 0)
+    gentle = 1.5 * between(rows, one) - 0.5 * between(one, two)
+    local = np.where(edge, np.clip(gentle, 0.2 * local, 2.0 * local), local)
     mean = np.add.reduceat(local, first) / (last - first + 1)
     rest = local <= AT_REST * mean[segment]
     moving = np.maximum(np.add.reduceat((~rest).astype(np.float64), first), 1.0)

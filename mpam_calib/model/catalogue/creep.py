@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.priors import LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
 
 ONSET = 1.0
@@ -16,9 +16,7 @@ ONSET = 1.0
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (
-        Parameter(
-            "creep_per_decade", Normal(0.0, 0.05), "share of the force lost per decade", "", "1/decade"
-        ),
+        Parameter("creep_per_decade", LongTailed(0.05), "share of the force lost per decade", "", "1/decade"),
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.priors import LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.units import MINUTE
 
@@ -15,7 +15,7 @@ from mpam_calib.units import MINUTE
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     # 2 % of the force scale over the test, or over ten minutes of a longer one.
     sd = 0.02 * setting.force_scale / float(np.clip(setting.duration, MINUTE, 10.0 * MINUTE))
-    return (Parameter("drift_N_per_min", Normal(0.0, sd), "wander of the load cell's zero"),)
+    return (Parameter("drift_N_per_min", LongTailed(sd), "wander of the load cell's zero"),)
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.priors import LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (
-        Parameter("offset_mm", Normal(0.0, 0.02 * setting.geometry.L0), "true shortening minus the reading"),
+        Parameter("offset_mm", LongTailed(0.02 * setting.geometry.L0), "true shortening minus the reading"),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.priors import LongTailed, Parameter
 from mpam_calib.model.reference import reference_shape, rest_of
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.kinematics import Rest, Shape
@@ -36,7 +36,7 @@ def _unit(setting: Setting) -> float:
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (
-        Parameter("next_order", Normal(0.0, SHARE), "size of the missing power over the force scale", "", ""),
+        Parameter("next_order", LongTailed(SHARE), "size of the missing power over the force scale", "", ""),
     )
 
 

@@ -7,15 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.priors import LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (
-        Parameter(
-            "rate_per_decade", Normal(0.0, 0.3), "growth of friction per tenfold speed", "", "1/decade"
-        ),
+        Parameter("rate_per_decade", LongTailed(0.3), "growth of friction per tenfold speed", "", "1/decade"),
     )
 
 

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.priors import LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (
         Parameter(
-            "first_cycle_fraction", Normal(0.0, 0.2), "extra bladder stiffness in the first cycle", "", ""
+            "first_cycle_fraction", LongTailed(0.2), "extra bladder stiffness in the first cycle", "", ""
         ),
     )
 
