@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 STILL_SHARE = 0.01
 """A stroke shorter than this share of the longest is a hold."""
+DWELL_SHARE = 0.005
+"""Where so much of its way is left, a crosshead that dwells at the ends is still under way."""
 PULL_SHARE = 0.02
 """A muscle that shows this share of its greatest force pulls."""
 
@@ -182,14 +184,19 @@ def _stroke_time(loops: Loops) -> float:
 
 
 def _speed(loops: Loops) -> float:
-    """Geometric mean of the speeds of the strokes that move, m/s; the thesis's where none does."""
-    strokes = pd.DataFrame({"x": loops.displacement_m, "t": loops.time_s}).groupby(loops.stroke)
-    travel = (strokes["x"].max() - strokes["x"].min()).to_numpy()
-    time = np.maximum((strokes["t"].max() - strokes["t"].min()).to_numpy(), 1e-9)
-    moving = travel > STILL_SHARE * travel.max(initial=0.0)
-    return (
-        float(np.exp(np.mean(np.log(travel[moving] / time[moving])))) if moving.any() else 50.0 * MM / MINUTE
-    )
+    """Geometric mean of the speeds of the strokes that move, m/s; the thesis's where none does.
+
+    A stroke's speed is its way over the time that it takes, less what it dwells at its ends.
+    """
+    x = pd.Series(loops.displacement_m)
+    low, high = (x.groupby(loops.stroke).transform(f) for f in ("min", "max"))
+    way = high - low
+    under_way = (x > low + DWELL_SHARE * way) & (x < high - DWELL_SHARE * way)
+    rows = pd.DataFrame({"x": x, "t": loops.time_s})[under_way & (way > STILL_SHARE * way.max())]
+    strokes = rows.groupby(loops.stroke[rows.index])
+    spans = strokes.max() - strokes.min()
+    spans = spans[spans["t"] > 0.0]
+    return float(np.exp(np.mean(np.log(spans["x"] / spans["t"])))) if len(spans) else 50.0 * MM / MINUTE
 
 
 def _level_time(loops: Loops) -> float:

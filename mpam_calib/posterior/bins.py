@@ -27,8 +27,10 @@ UNREDUCED = 16
 """Strokes of up to so many readings are left as they are."""
 CHUNK = 32
 """At most so many consecutive readings of a bin tell of the fast noise."""
-AT_REST = 0.1
-"""Up to this share of its stroke's mean speed the crosshead is at rest."""
+AT_REST = 0.06
+"""Up to this share of its stroke's largest speed the crosshead is at rest."""
+REST_BINS = 0.2
+"""Bins of a stroke's rest, at most, for each one of its motion."""
 SLACK_SHARE = 0.2
 """A bin with this share of its readings at or below the floor says "slack", not a value."""
 
@@ -84,22 +86,34 @@ class LoopBins:
         return Readings(**{**low.__dict__, **both})
 
 
-def _edges(rows: int, most: int) -> Ints:
-    """First rows of the bins of a stroke of ``rows`` readings: about ``most``, with finer first ones."""
-    if rows <= min(UNREDUCED, most):
-        return np.arange(rows)
-    bins = min(most, max(UNREDUCED, rows // 4))
+def _edges(rest: NDArray[np.bool_], most: int) -> Ints:
+    """First rows of the bins of a stroke: about ``most``, with finer first ones.
+
+    Rows (n,) at rest count less: however long a stroke dwells, its motion keeps most of the bins.
+    """
+    n = len(rest)
+    moving = n - int(rest.sum())
+    weight = np.where(rest & (moving > 0), min(1.0, REST_BINS * moving / max(n - moving, 1)), 1.0)
+    rows = float(weight.sum())
+    bins = int(np.ceil(rows)) if rows <= min(UNREDUCED, most) else min(most, max(UNREDUCED, int(rows) // 4))
     fractions = np.arange(bins, dtype=np.float64)
     if rows >= 8 * bins:
         fractions = np.concatenate([[0.0], FINE, fractions[3:]])
-    return np.unique(np.round(fractions / bins * rows).astype(np.int64))
+    passed = np.concatenate([[0.0], np.cumsum(weight)])
+    edges = np.round(np.interp(fractions / bins * rows, passed, np.arange(n + 1)))
+    # Motion and the rests at a stroke's ends share no bin: their friction is another.
+    ends = np.flatnonzero(~rest)[[0, -1]] + [0, 1] if moving else np.zeros(0)
+    return np.unique(np.concatenate([edges, ends[ends < n]])).astype(np.int64)
 
 
 def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
     """Reduce loops (rows in time order) to about ``most`` bins a stroke."""
     stroke_starts = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
     lengths = np.diff(np.append(stroke_starts, len(loops.stroke)))
-    per_stroke = [_edges(int(n), most) for n in lengths]
+    speed, rest = _speed(
+        loops, stroke_starts, stroke_starts + lengths - 1, np.repeat(np.arange(len(lengths)), lengths)
+    )
+    per_stroke = [_edges(part, most) for part in np.split(rest, stroke_starts[1:])]
     starts = np.concatenate([s + e for s, e in zip(stroke_starts, per_stroke, strict=True)])
     segment = np.repeat(np.arange(len(lengths)), [len(e) for e in per_stroke])
     position = np.concatenate([np.arange(len(e)) for e in per_stroke])
@@ -114,9 +128,6 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
     spread = np.sqrt(mean((loops.displacement_m - displacement[row_bin]) ** 2))
     direction = np.where(loops.branch[starts] == -1, 1.0, -1.0)
     travel, reversal, at_level = _history(loops, stroke_starts, lengths)
-    speed, rest = _speed(
-        loops, stroke_starts, stroke_starts + lengths - 1, np.repeat(np.arange(len(lengths)), lengths)
-    )
     # A bin that comes to rest has the speed of its moving part.
     weight = np.where(rest, 1e-9, 1.0)
 
@@ -276,8 +287,7 @@ def _speed(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array,
     edge = (inward != 0) & (reach > 0)
     gentle = 1.5 * between(rows, one) - 0.5 * between(one, two)
     local = np.where(edge, np.clip(gentle, 0.2 * local, 2.0 * local), local)
-    mean = np.add.reduceat(local, first) / (last - first + 1)
-    rest = local <= AT_REST * mean[segment]
+    rest = local <= AT_REST * np.maximum.reduceat(local, first)[segment]
     moving = np.maximum(np.add.reduceat((~rest).astype(np.float64), first), 1.0)
     typical = np.add.reduceat(np.where(rest, 0.0, local), first) / moving
     return np.where(rest, typical[segment], local), rest
