@@ -267,12 +267,14 @@ def _half_step(displacement: Array, end: Ints, inner: Ints, direction: Array) ->
 
 
 def _speed(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array, NDArray[np.bool_]]:
-    """Speed at every row (m/s), over a fortieth of the stroke to either side, and whether it is at rest.
+    """Speed at every row (m/s), over a fortieth of the rows under way to either side; whether it is at rest.
 
     At rest the speed is the one that the stroke otherwise has: friction does not vanish with the motion.
     """
     rows = np.arange(len(segment))
-    window = np.maximum((last - first + 1) // 40, 1)[segment]
+    low, high = (f.reduceat(loops.displacement_m, first)[segment] for f in (np.minimum, np.maximum))
+    inside = np.minimum(loops.displacement_m - low, high - loops.displacement_m) > 0.005 * (high - low)
+    window = np.maximum(np.add.reduceat(inside.astype(np.int64), first) // 40, 1)[segment]
     before, after = np.maximum(rows - window, first[segment]), np.minimum(rows + window, last[segment])
 
     def between(one: Ints, other: Ints) -> Array:

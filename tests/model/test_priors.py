@@ -7,11 +7,36 @@ import pytest
 from scipy import integrate, special, stats
 
 from mpam_calib.model.model import build_model
-from mpam_calib.model.priors import HalfNormal, LogNormal, LogUniform, Normal, NormalWithin, Uniform
+from mpam_calib.model.priors import (
+    TAIL,
+    HalfNormal,
+    LogNormal,
+    LogUniform,
+    LongTailed,
+    Normal,
+    NormalWithin,
+    Uniform,
+)
 
 from .build import blueprint
 
+
+class SinhArcsinh(stats.rv_continuous):
+    """Jones and Pewsey 2009, equations 1 and 2, without skew: S(x) = sinh(δ arsinh x)."""
+
+    def _pdf(self, x, delta):
+        s = np.sinh(delta * np.arcsinh(x))
+        return delta * np.sqrt(1.0 + s**2) / np.sqrt(2.0 * np.pi * (1.0 + x**2)) * np.exp(-0.5 * s**2)
+
+    def _cdf(self, x, delta):
+        return special.ndtr(np.sinh(delta * np.arcsinh(x)))
+
+    def _sf(self, x, delta):
+        return special.ndtr(-np.sinh(delta * np.arcsinh(x)))
+
+
 CASES = {
+    "long-tailed": (LongTailed(0.4), SinhArcsinh(name="sinh_arcsinh")(TAIL, scale=0.4 * TAIL)),
     "normal": (Normal(3.0, 2.0), stats.norm(3.0, 2.0)),
     "below": (NormalWithin(1.0, 2.0, -np.inf, 2.5), stats.truncnorm(-np.inf, 0.75, 1.0, 2.0)),
     "far below": (NormalWithin(0.0, 1.0, -np.inf, -2.0), stats.truncnorm(-np.inf, -2.0, 0.0, 1.0)),
@@ -93,6 +118,7 @@ def test_widened_priors():
     for factor in (0.5, 2.0):
         assert Normal(3.0, 2.0).widened(factor) == Normal(3.0, factor * 2.0)
         assert LogNormal(0.2, 0.7).widened(factor) == LogNormal(0.2, factor * 0.7)
+        assert LongTailed(0.2).widened(factor) == LongTailed(factor * 0.2)
         assert HalfNormal(0.2).widened(factor).sd == pytest.approx(factor * HalfNormal(0.2).sd)
         assert Uniform(-1.0, 4.0).widened(factor) == Uniform(-1.0, -1.0 + factor * 5.0)
         within = NormalWithin(0.5, 2.0, -0.5, np.inf).widened(factor)

@@ -1,0 +1,182 @@
+"""The climb to a hypothesis's mode: Levenberg-Marquardt on its sizes, the moduli exact given them.
+
+All on the axes that whiten the problem's noise and remainder; both priors enter as pseudo-observations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from mpam_calib.criticism.problem import Problem
+from mpam_calib.model.bend import BENDS
+from mpam_calib.model.chain import Chain
+
+Array = NDArray[np.float64]
+
+STEP = 1e-4
+ROUNDS = 25
+CONVERGED, SHARE = 5e-3, 1e-4
+"""Where the next round promises fewer nats than this, or than this share of the misfit, the climb ends."""
+RIDGE = 0.02
+"""Least damping after a step that led downhill."""
+NUDGE = 1e-4
+"""Step of a force that depends on itself, as a share of the force scale."""
+SETTLED = 0.02
+"""Share of a reading's noise to which a force that depends on itself must have settled."""
+FURTHEST, MOST_BENT = 7.0, 2.5
+"""Largest coordinate (prior sds) of a size, and of a bend."""
+REACH = 1.5
+"""Longest step of a coordinate, prior sds."""
+COARSE = 0.01
+"""Share of the misfit below which the sizes have settled well enough to let them bend."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """The force linearised at coordinates ``u`` (d,), with the linear ones ``eta`` (q,) at their optimum.
+
+    ``residual`` (n,) and ``J`` (n, d + q) are whitened, ``force`` (n,) is the model's in newtons,
+    ``guide`` (m,) the same at the lean readings; ``objective`` is the log density up to a constant.
+    """
+
+    u: Array
+    eta: Array
+    residual: Array
+    J: Array
+    force: Array
+    guide: Array
+    objective: float
+
+
+@dataclass
+class Climb:
+    """A climb beside a remainder of SIZES[size]; ``extra`` (n, r), N, are further linear columns."""
+
+    problem: Problem
+    chain: Chain
+    size: int
+    extra: Array
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """What ``u`` stands for."""
+        return tuple(p.name for p in self.chain.parameters)
+
+    @cached_property
+    def _offsets(self) -> Array:
+        d = len(self.names)
+        return np.concatenate([np.zeros((1, d)), STEP * np.eye(d)])
+
+    @cached_property
+    def _extra(self) -> Array:
+        """The further columns, whitened."""
+        return np.asarray((self.problem.axes[0] @ self.extra) / self.problem.spreads[self.size][:, None])
+
+    def values(self, u: Array) -> dict[str, Array]:
+        """Values (B, 1) for coordinates u (B, d)."""
+        found = {q.name: q.prior.from_normal(u[:, i : i + 1]) for i, q in enumerate(self.chain.parameters)}
+        return found or {"": np.zeros((len(u), 1))}
+
+    def guide(self) -> Array:
+        """The measured force at the lean readings: the first estimate of what depends on the force."""
+        readings, first, second = self.problem.lean
+        result = np.empty(len(readings))
+        result[: len(self.problem)] = self.problem.force
+        result[first], result[second] = self.problem.force, self.problem.force
+        return result
+
+    def look(self, u: Array, guide: Array, eta: Array) -> Place:
+        """Linearise at u; ``eta`` (p,) serves where the force depends on itself."""
+        problem, p = self.problem, self.chain.linear_size
+        _, first, second = problem.lean
+        if self.chain.uses_force:
+            nudge = NUDGE * problem.force_scale
+            fixed, columns = self._terms(
+                u + np.concatenate([self._offsets, self._offsets[:1]]),
+                _nudged(guide, len(self._offsets) + 1, nudge),
+            )
+            # A force that depends on itself, F = f(F): one Newton step of its fixed point, for all at once.
+            slope = (fixed[-1] - fixed[0] + (columns[-1] - columns[0]) @ eta) / nudge
+            factor = 1.0 / np.clip(1.0 - slope, 0.2, 5.0)
+            fixed = guide + (fixed[:-1] - guide) * factor
+            columns = columns[:-1] * factor[:, None]
+        else:
+            fixed, columns = self._terms(u + self._offsets, guide)
+        whole, whole_columns = fixed[0], columns[0]
+        fixed = 0.5 * (fixed[:, first] + fixed[:, second]) + problem.bow
+        columns = 0.5 * (columns[:, first] + columns[:, second])
+        axes, spread = problem.axes[0], problem.spreads[self.size][:, None]
+        white = (axes @ np.column_stack([problem.force - fixed[0], columns[0]])) / spread
+        X = np.concatenate([white[:, 1:], self._extra], axis=1)
+        # Given the sizes, the linear coordinates' optimum is exact.
+        gram = X.T @ X + np.eye(X.shape[1])
+        best = np.asarray(linalg.solve(gram, X.T @ white[:, 0], assume_a="pos")) if len(gram) else np.zeros(0)
+        residual = white[:, 0] - X @ best
+        moved = (fixed[1:] - fixed[0]) + (columns[1:] - columns[0]) @ best[:p]
+        objective = -0.5 * float(residual @ residual + u @ u + best @ best)
+        return Place(
+            u=u,
+            eta=best,
+            residual=residual,
+            J=np.concatenate([(axes @ moved.T) / (STEP * spread), X], axis=1),
+            force=fixed[0] + columns[0] @ best[:p],
+            guide=whole + whole_columns @ best[:p],
+            objective=objective if np.isfinite(objective) else -np.inf,
+        )
+
+    def _terms(self, u: Array, guide: Array) -> tuple[Array, Array]:
+        readings = self.problem.lean[0]
+        got = self.chain.terms(self.values(u), readings, guide)
+        fixed = np.broadcast_to(got.fixed, (len(u), len(readings)))
+        return fixed, np.broadcast_to(got.columns, (len(u), len(readings), self.chain.linear_size))
+
+    def climb(self, u: Array, guide: Array, eta: Array) -> Place:
+        """The mode that is reached from u (d,)."""
+        d, still = len(u), SETTLED * self.problem.noise_level.total
+        bends = np.array([BENDS in name for name in self.names], dtype=bool)
+        furthest = np.where(bends, MOST_BENT, FURTHEST)
+        released = not bends.any() or bool(np.any(u[bends] != 0.0))
+        best: Place | None = None
+        damping = 1e-3
+        for _round in range(ROUNDS):
+            place = self.look(u, guide, eta)
+            if best is None or place.objective > best.objective:
+                waiting = self.chain.uses_force and float(np.abs(place.guide - guide).max()) > still
+                damping = max(damping / 5.0, 1e-6)
+                best = place
+            else:
+                waiting = False
+                damping = max(8.0 * damping, RIDGE)
+                if damping > 1e4:
+                    break
+            # What depends on the force is fed with the model's own.
+            guide, eta = best.guide, best.eta[: self.chain.linear_size]
+            J, misfit = best.J, float(best.residual @ best.residual)
+            hessian = J.T @ J + np.eye(J.shape[1])
+            gradient = J.T @ best.residual - np.concatenate([best.u, best.eta])
+            free = np.ones(len(hessian), dtype=bool)
+            free[:d] = ((np.abs(best.u) < furthest) | (best.u * gradient[:d] < 0.0)) & (released | ~bends)
+            damped = hessian[np.ix_(free, free)] + damping * np.diag(np.diagonal(hessian)[free])
+            step = np.zeros(len(hessian))
+            step[free] = linalg.solve(damped, gradient[free], assume_a="pos")
+            promise = 0.5 * float(step @ gradient)
+            if d == 0 or (promise < max(CONVERGED, SHARE * misfit) and not waiting and released):
+                break
+            # Sizes first: the bend of a size near zero says nothing and wanders off.
+            released = released or promise < COARSE * misfit
+            step *= min(1.0, REACH / float(np.abs(step[:d]).max(initial=1e-9)))
+            u = np.clip(best.u + step[:d], -furthest, furthest)
+        assert best is not None
+        return best
+
+
+def _nudged(guide: Array, copies: int, nudge: float) -> Array:
+    """The guide (m,) for every row of a batch (copies, m), the last one moved."""
+    rows = np.repeat(guide[None, :], copies, axis=0)
+    rows[-1] += nudge
+    return rows

@@ -1,0 +1,98 @@
+"""What a bin knows of its motion, on a crosshead that turns gently and dwells: against the exact one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from model import build
+
+from mpam_calib.model.blueprint import draw_blueprint
+from mpam_calib.posterior.bins import bin_loops, row_readings
+from mpam_calib.specimen.recording import Loops
+
+STROKE, HALF = 0.012, 6.0
+"""Way of a stroke (m) and the time that it takes (s)."""
+
+
+def gentle(rows: int, dwell: float = 0.0, strokes: int = 6, seed: int | None = None) -> tuple[Loops, dict]:
+    """x = STROKE (1 − cos(π t/HALF))/2 there and back, a dwell after each stroke; and the exact motion."""
+    n = rows + round(rows * dwell / HALF)
+    within = (np.arange(n) + 0.5) * HALF / rows
+    moving = np.minimum(within, HALF)
+    way = 0.5 * STROKE * (1.0 - np.cos(np.pi * moving / HALF))
+    speed = 0.5 * STROKE * np.pi / HALF * np.sin(np.pi * moving / HALF)
+    period = n * HALF / rows
+    x = np.concatenate([way if i % 2 == 0 else STROKE - way for i in range(strokes)])
+    if seed is not None:
+        x = x + 1e-6 * np.random.default_rng(seed).standard_normal(len(x))
+    number = np.repeat(np.arange(strokes), n)
+    ones = np.ones(len(x))
+    made = Loops(
+        time_s=np.concatenate([within + i * period for i in range(strokes)]),
+        pressure_Pa=1.5e5 * ones,
+        displacement_m=x,
+        force_N=20.0 * ones,
+        level=0 * number,
+        cycle=number // 2 + 1,
+        branch=np.where(number % 2 == 0, -1, 1),
+        stroke=number,
+        clock=0 * number,
+        censored=np.zeros(len(x), dtype=bool),
+    )
+    exact = {"travel": np.tile(way, strokes), "speed": np.tile(speed, strokes), "moving": within < HALF}
+    return made, exact
+
+
+@pytest.mark.parametrize("rows", [12, 40, 300])
+def test_travel_begins_at_the_turn(rows):
+    """Between two readings on either side of a turn a gentle crosshead hardly moves: 0.1 % of the stroke."""
+    made, exact = gentle(rows)
+    assert row_readings(made).travel == pytest.approx(exact["travel"], abs=1e-3 * STROKE)
+
+
+def test_travel_of_a_sudden_turn():
+    """At full speed the turn lies half a step before the first reading (to rounding)."""
+    made = build.loops((150.0,), 12.0, 12, cycles=2)
+    travel = row_readings(made).travel
+    assert travel[made.stroke == 2] == pytest.approx((np.arange(12) + 0.5) * 1e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize("rows", [12, 40, 300])
+def test_speed_follows_the_motion(rows):
+    """To 5 % of the largest speed everywhere, the readings next to a turn included."""
+    made, exact = gentle(rows)
+    top = exact["speed"].max()
+    at_rest = exact["speed"] < 0.06 * top
+    assert row_readings(made).speed[~at_rest] == pytest.approx(exact["speed"][~at_rest], abs=0.05 * top)
+
+
+@pytest.mark.parametrize("seed", [None, 3])
+def test_motion_and_dwell_share_no_bin(seed):
+    """Three quarters of the rows are a dwell; the motion keeps its bins, and none is mixed."""
+    made, exact = gentle(20, dwell=60.0, seed=seed)
+    bins = bin_loops(made, 16)
+    moving = np.tile(exact["moving"], 6)
+    starts = np.searchsorted(made.time_s, bins.start)
+    stops = np.searchsorted(made.time_s, bins.stop) + 1
+    shares = np.array([moving[i:j].mean() for i, j in zip(starts, stops, strict=True)])
+    # The last reading or two under way are slower than what counts as rest.
+    assert np.all((shares < 0.01) | (shares > 0.99) | (shares * bins.count <= 2.0))
+    assert np.sum(shares > 0.99) >= 6 * 10
+    assert bins.rest[shares < 0.01] == pytest.approx(1.0)
+    assert bins.rest[shares > 0.99].max() < 0.6
+
+
+def test_a_stroke_without_motion_keeps_its_bins():
+    """Held at one length, as in an isometric test, time alone divides the rows."""
+    made, _ = gentle(40, strokes=2)
+    still = Loops(**{**made.__dict__, "displacement_m": np.full(len(made.time_s), 0.004)})
+    assert len(bin_loops(still, 16)) == 2 * 16
+
+
+@pytest.mark.parametrize("dwell", [0.0, 2.0, 30.0])
+def test_a_dwell_does_not_slow_a_stroke_down(dwell):
+    """The mean speed without the last half per cent of the way at either end, which takes 4.5 % each."""
+    made, _ = gentle(60, dwell=dwell)
+    blueprint = draw_blueprint(build.specimen({"law": "linear", "order": 2}, made), build.PLAIN)
+    share = 1.0 - 2.0 * np.arccos(1.0 - 2.0 * 0.005) / np.pi
+    assert blueprint.setting().speed == pytest.approx(0.99 / share * STROKE / HALF, rel=0.03)
