@@ -31,3 +31,20 @@ def log_determinant(factor: Array) -> Array:
     """ln|M| (...,) of M = L Lᵀ, from its Cholesky factor L (..., k, k)."""
     result: Array = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=-2, axis2=-1)), axis=-1)
     return result
+
+
+def condense(matrix: Array, right: Array) -> tuple[Array, Array]:
+    """Cholesky factors L of matrices M (B, k, k) and L⁻¹ right (B, k), from one factorisation; for M ≥ 1."""
+    B, k, _ = matrix.shape
+    bordered = np.empty((B, k + 1, k + 1))
+    bordered[:, :k, :k] = matrix
+    bordered[:, k, :k] = bordered[:, :k, k] = right
+    # The corner must only exceed rightᵀ M⁻¹ right.
+    bordered[:, k, k] = 1.0 + 2.0 * np.sum(right**2, axis=1)
+    factor = cholesky(bordered)
+    return factor[:, :k, :k], factor[:, k, :k]
+
+
+def solve_transposed(factor: Array, right: Array) -> Array:
+    """L⁻ᵀ right (B, k) for Cholesky factors L (B, k, k)."""
+    return solve(np.swapaxes(factor, 1, 2), right)

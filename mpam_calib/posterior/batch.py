@@ -11,8 +11,4 @@ FEWEST, MOST = 4, 128
 
 def batch_size(target: Collapsed) -> int:
     """Vectors at once for a target."""
-    data = target.data
-    parts = (data.bins, data.points, None if data.tensile is None else data.tensile.strain)
-    readings = sum(len(part) for part in parts if part is not None)
-    cells = readings * (1 + sum(target.model.linear_sizes))
-    return max(FEWEST, min(MOST, CELLS // max(cells, 1)))
+    return max(FEWEST, min(MOST, CELLS // max(target.cells, 1)))

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,27 +21,20 @@ from mpam_calib.model.model import CONTRACTION_SD, Model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
-from mpam_calib.posterior.algebra import cholesky, log_determinant, solve
+from mpam_calib.posterior.algebra import condense, log_determinant, solve_transposed
 from mpam_calib.posterior.bins import LoopBins
 from mpam_calib.posterior.covariance import StrokeCovariance, fast_noise_covariance, fast_noise_log_likelihood
+from mpam_calib.posterior.piece import LOG_2PI, Piece, forget, segment_piece, total, white_piece
 from mpam_calib.posterior.points import Points, TensilePoints
+from mpam_calib.posterior.scatter import Scatter
 from mpam_calib.posterior.sites import FreeRows, Sites, chunk_log_likelihood, usual_chunks
 from mpam_calib.posterior.slack import Slack, with_slack
+from mpam_calib.posterior.strokes import Strokes
 from mpam_calib.posterior.white import white_terms
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Array]
 Place = slice | NDArray[np.int64]
-
-LOG_2PI = float(np.log(2.0 * np.pi))
-
-
-class Piece(NamedTuple):
-    """One data set's share: Aᵀ C⁻¹ A (B, k, k), Aᵀ C⁻¹ r (B, k), rᵀ C⁻¹ r + ln|C| + n ln 2π (B,)."""
-
-    gram: Array
-    pull: Array
-    constant: Array
 
 
 @dataclass(frozen=True)
@@ -77,6 +69,15 @@ class Collapsed:
     data: Data
     guide: Guide
 
+    @property
+    def cells(self) -> int:
+        """Readings × columns that one θ takes in memory."""
+        bins, points, tensile = self.data.bins, self.data.points, self.data.tensile
+        parts = (bins, points, None if tensile is None else tensile.strain)
+        readings = sum(len(part) for part in parts if part is not None)
+        saved = 0 if bins is None or self._strokes is None else len(bins) * self._strokes.saved
+        return readings * (1 + sum(self.model.linear_sizes)) - saved
+
     def log_posterior(self, u: Array) -> Array:
         """Log posterior density (B,) of sampler coordinates u (B, d), whose prior is standard normal."""
         prior = -0.5 * np.sum(u**2, axis=1) - 0.5 * u.shape[1] * LOG_2PI
@@ -93,37 +94,32 @@ class Collapsed:
 
     def linear_draws(self, values: Values, rng: np.random.Generator) -> Array:
         """One draw of η (B, k) for each θ, from its exact conditional distribution."""
-        _, mean, factor = self._solve(values)
-        noise = rng.standard_normal(mean.shape)
+        _, centre, factor = self._solve(values)
         # factor is the Cholesky factor L of S: L⁻ᵀ z has covariance S⁻¹.
-        shift = np.linalg.solve(np.swapaxes(factor, 1, 2), noise[..., None])[..., 0]
-        return np.asarray(mean + shift)
+        return solve_transposed(factor, centre + rng.standard_normal(centre.shape))
 
     def linear_mean(self, values: Values) -> Array:
         """Conditional mean (B, k) of η."""
-        return self._solve(values)[1]
+        _, centre, factor = self._solve(values)
+        return solve_transposed(factor, centre)
 
     def _solve(self, values: Values) -> tuple[Array, Array, Array]:
-        B = len(next(iter(values.values())))
-        k = sum(self.model.linear_sizes)
-        gram = np.zeros((B, k, k))
-        gram[:, np.arange(k), np.arange(k)] = 1.0
-        pull = np.zeros((B, k))
-        constant = np.zeros(B)
+        """ln p(y | θ), and L⁻¹ h (B, k) with the Cholesky factor L of S (B, k, k): the mean is L⁻ᵀ L⁻¹ h."""
         slack: list[Slack] = []
         free: list[FreeRows] = []
-        for piece in self._pieces(values, slack, free):
-            gram += piece.gram
-            pull += piece.pull
-            constant = constant + piece.constant
+        gram, pull, constant = total(self._pieces(values, slack, free))
+        diagonal = np.arange(gram.shape[1])
+        gram[:, diagonal, diagonal] += 1.0
         if slack:
             value, mean, factor = with_slack(gram, pull, constant, slack)
+            centre = np.einsum("bkl,bk->bl", factor, mean)
         else:
-            factor, mean = cholesky(gram), solve(gram, pull)
-            value = -0.5 * (constant - np.einsum("bk,bk->b", pull, mean) + log_determinant(factor))
+            factor, centre = condense(gram, pull)
+            value = -0.5 * (constant - np.sum(centre**2, axis=1) + log_determinant(factor))
+            mean = solve_transposed(factor, centre) if free else centre
         for rows in free:
             value = value + rows.correction(mean, values[FREEDOM][:, 0])
-        return value, mean, factor
+        return value, centre, factor
 
     def _pieces(self, values: Values, slack: list[Slack], free: list[FreeRows]) -> list[Piece]:
         pieces = []
@@ -173,16 +169,16 @@ class Collapsed:
         uneven = GROWTH in values or dof is not None
         if not (uneven or CORRELATED in values or ROUGH in values or bins.slack.any()):
             return self._white_bins(values, bins)
+        if self._strokes is not None:
+            return self._even_bins(values, bins, self._strokes)
+        if self._strokes is not None:
+            return self._even_bins(values, bins, self._strokes)
         n = len(bins)
         terms = self.model.chain.terms(values, bins.readings, self.guide.bins)
         fixed = 0.5 * (terms.fixed[:, :n] + terms.fixed[:, n:])
         columns = 0.5 * (terms.columns[:, :n] + terms.columns[:, n:])
-        white = values[WHITE][:, 0]
+        white, correlated, time, rough = self._noise(values)
         B = len(white)
-        zero = np.zeros(B)
-        correlated = values[CORRELATED][:, 0] if CORRELATED in values else zero
-        time = values[TIME][:, 0] if TIME in values else zero + 1.0
-        rough = values[ROUGH][:, 0] if ROUGH in values else zero
         layout = self._layout
         residual = np.broadcast_to(bins.force - fixed, (B, n))
         kind = layout.kind
@@ -213,10 +209,10 @@ class Collapsed:
                 )
             )
             lost = lost | bins.slack[layout.index]
-            covariance = _forget(covariance[:, kind], lost)
+            covariance = forget(covariance[:, kind], lost)
             kind = np.arange(bins.segments)
             padded[:, lost.ravel()] = 0.0
-        piece, weighted = _segment_piece(covariance, kind, padded, int((~lost).sum()))
+        piece, weighted = segment_piece(covariance, kind, padded, int((~lost).sum()))
         if dof is not None:
             at = layout.index[~lost]
             seen = weighted[:, ~lost.ravel()]
@@ -231,6 +227,48 @@ class Collapsed:
                 fast = fast_noise_log_likelihood(bins.scatter, bins.averaged, white, correlated, time)
             piece = piece._replace(constant=piece.constant - 2.0 * fast)
         return piece
+
+    def _noise(self, values: Values) -> tuple[Array, Array, Array, Array]:
+        """White and correlated sd (N), time constant (s), the strokes' own remainder (N), each (B,)."""
+        white = values[WHITE][:, 0]
+        given = {CORRELATED: np.zeros_like(white), TIME: np.ones_like(white), ROUGH: np.zeros_like(white)}
+        for name in given.keys() & values.keys():
+            given[name] = values[name][:, 0]
+        return white, given[CORRELATED], given[TIME], given[ROUGH]
+
+    def _even_bins(self, values: Values, bins: LoopBins, strokes: Strokes) -> Piece:
+        """Bins whose noise is Gaussian and alike in all of them."""
+        assert self.model.chain is not None
+        white, correlated, time, rough = self._noise(values)
+        fixed, slope, columns = self.model.chain.factored(values, bins.readings, self.guide.bins)
+        n, B, p = len(bins), len(white), columns.shape[-1]
+        slope = 0.5 * np.broadcast_to(slope, (len(slope), 2 * n))
+        known = np.empty((p + 1, B, n))
+        for one, column in zip(known, np.moveaxis(columns, 2, 0), strict=False):
+            np.multiply(slope[:, :n], column[:, :n], out=one)
+            one += slope[:, n:] * column[:, n:]
+        known[p] = bins.force - 0.5 * (fixed[:, :n] + fixed[:, n:])
+        amplitude = values[SMOOTH][:, 0] if SMOOTH in values else np.zeros(B)
+        full, log_det = strokes.products(strokes.factor(white, correlated, time, rough), known, amplitude)
+        constant = full[:, -1, -1] + log_det + n * LOG_2PI
+        if self._scatter is not None:
+            constant = constant - 2.0 * self._scatter.log_likelihood(white, correlated, time)
+        return Piece(full[:, :-1, :-1], full[:, :-1, -1], constant).widened(sum(self.model.linear_sizes))
+
+    @cached_property
+    def _strokes(self) -> Strokes | None:
+        """The bins, where their noise allows them to be taken as one."""
+        bins, names = self.data.bins, self.model.names
+        uneven = bins is None or bins.slack.any() or GROWTH in names or FREEDOM in names
+        if uneven or not (CORRELATED in names or ROUGH in names) or (steps := self._layout.steps) is None:
+            return None
+        return Strokes.build(self._layout, steps, self._bin_remainder)
+
+    @cached_property
+    def _scatter(self) -> Scatter | None:
+        bins = self.data.bins
+        assert bins is not None
+        return None if bins.scatter is None else Scatter.build(bins.scatter, bins.averaged)
 
     @property
     def _bin_force(self) -> Array:
@@ -255,7 +293,7 @@ class Collapsed:
 
     def free_noise(self, values: Values) -> list[Array]:
         """Noise (B, n), N, of the bins and then of the points that are seen, where it is Student-t."""
-        _, mean, _ = self._solve(values)
+        mean = self.linear_mean(values)
         free: list[FreeRows] = []
         self._pieces(values, [], free)
         return [rows.scale * rows.noise(mean) for rows in free]
@@ -268,12 +306,7 @@ class Collapsed:
         fixed, slope, columns = self.model.chain.factored(values, nodes.readings, guide)
         white = values[WHITE][:, 0]
         piece = white_terms(nodes, bins.averaged, fixed, slope, columns, white)
-        if sum(self.model.linear_sizes) == columns.shape[-1]:
-            return Piece(*piece)
-        k, p = sum(self.model.linear_sizes), columns.shape[-1]
-        gram, pull = np.zeros((len(white), k, k)), np.zeros((len(white), k))
-        gram[:, :p, :p], pull[:, :p] = piece[0], piece[1]
-        return Piece(gram, pull, piece[2])
+        return Piece(*piece).widened(sum(self.model.linear_sizes))
 
     def _points(self, values: Values, points: Points, slack: list[Slack], free: list[FreeRows]) -> Piece:
         assert self.model.chain is not None
@@ -302,14 +335,14 @@ class Collapsed:
                 )
             )
         if FREEDOM not in values:
-            return _white_piece(design[:, seen], residual[:, seen], variance[:, seen])
+            return white_piece(design[:, seen], residual[:, seen], variance[:, seen])
         scale = np.sqrt(variance[:, seen])
         noise = None if self.guide.point_noise is None else self.guide.point_noise[seen]
         sites = Sites.at(noise, scale, values[FREEDOM][:, 0])
         spread = variance[:, seen] * sites.spread
         residual = residual[:, seen] - scale * sites.shift
         free.append(FreeRows(design[:, seen] / spread[..., None], residual / spread, scale, sites))
-        return _white_piece(design[:, seen], residual, spread)
+        return white_piece(design[:, seen], residual, spread)
 
     def _tensile(self, values: Values, tensile: TensilePoints) -> Piece:
         model = self.model.tensile
@@ -323,34 +356,4 @@ class Collapsed:
         if MISFIT in values:
             design[:, :, sizes[0] + sizes[1] :] = values[MISFIT][:, :, None] * model.remainder(tensile.strain)
         residual = np.broadcast_to(tensile.stress - powers @ mean[0], design.shape[:2])
-        return _white_piece(design, residual, values[NOISE] ** 2 / tensile.count)
-
-
-def _white_piece(design: Array, residual: Array, variance: Array) -> Piece:
-    weighted = design / variance[..., None]
-    gram = np.swapaxes(design, 1, 2) @ weighted
-    pull = np.einsum("bnk,bn->bk", weighted, residual)
-    constant = np.sum(residual**2 / variance + np.log(variance) + LOG_2PI, axis=1)
-    return Piece(gram, pull, constant)
-
-
-def _segment_piece(
-    covariance: Array, kind: NDArray[np.int64], padded: Array, rows: int
-) -> tuple[Piece, Array]:
-    """Correlated segments: covariance (B, K, m, m), kind (S,), [A r] padded (B, S·m, k + 1); C⁻¹[A r]."""
-    B, _, width = padded.shape
-    m = covariance.shape[-1]
-    log_dets = log_determinant(cholesky(covariance))
-    log_det = log_dets @ np.bincount(kind, minlength=covariance.shape[1])
-    inverse = np.linalg.inv(covariance)[:, kind]
-    weighted = (inverse @ padded.reshape(B, -1, m, width)).reshape(padded.shape)
-    full = np.swapaxes(padded, 1, 2) @ weighted
-    piece = Piece(full[:, :-1, :-1], full[:, :-1, -1], full[:, -1, -1] + log_det + rows * LOG_2PI)
-    return piece, weighted
-
-
-def _forget(covariance: Array, lost: NDArray[np.bool_]) -> Array:
-    """Give lost rows unit variance and no covariance, so that they carry no information."""
-    either = lost[:, :, None] | lost[:, None, :]
-    eye = np.eye(lost.shape[1])
-    return np.where(either, eye * lost[:, :, None], covariance)
+        return white_piece(design, residual, values[NOISE] ** 2 / tensile.count)

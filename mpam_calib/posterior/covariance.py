@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.posterior.bins import LoopBins
+from mpam_calib.posterior.markov import Parts
 
 Array = NDArray[np.float64]
 
@@ -16,6 +18,41 @@ ROUGH_LENGTH = 1.0 / 6.0
 """Correlation length of a stroke's own remainder, as a share of the stroke."""
 ALIKE = 0.02
 """Strokes whose bins agree to this share (rows, lags, kernel) have one covariance."""
+STEPS = 1e-8
+"""Rounding by which lags and kernels may differ from those made of single steps."""
+
+
+class Steps(NamedTuple):
+    """How kinds of strokes go on from bin to bin, all (m, K); the last bin's steps mean nothing.
+
+    ``within`` and ``onward``: rows from a bin's start to its end, and from there to the next one's start;
+    ``kernel``: the remainder's kernel between a bin and the next; ``follows``: whether there is a next one.
+    """
+
+    within: Array
+    onward: Array
+    kernel: Array
+    follows: NDArray[np.bool_]
+
+    @staticmethod
+    def of(lag: Array, rough: Array, seen: NDArray[np.bool_]) -> Steps | None:
+        """From lags and kernels (K, m, m) and places that are seen (K, m), if they are made of steps."""
+        m = seen.shape[1]
+        i = np.arange(m - 1)
+        within, onward, kernel = np.zeros((3, m, len(seen)))
+        onward[:-1], kernel[:-1] = lag[:, i, i + 1].T, rough[:, i, i + 1].T
+        within[1:-1] = lag[:, i[:-1], i[:-1] + 2].T - onward[:-2] - onward[1:-1]
+        follows = np.append(seen.T[1:], np.zeros((1, len(seen)), dtype=bool), axis=0)
+        within *= follows
+        start = np.cumsum(np.roll(within + onward, 1, axis=0), axis=0).T
+        path = np.cumsum(np.roll(np.log(np.where(follows, kernel, 1.0)), 1, axis=0), axis=0).T
+        rows = start[:, None, :] - (start + within.T)[:, :, None]
+        made = np.abs(rows - lag) <= STEPS * (1.0 + lag)
+        made &= np.abs(np.exp(path[:, None, :] - path[:, :, None]) - rough) <= STEPS
+        both = np.triu(seen[:, :, None] & seen[:, None, :], 1)
+        if not np.all(made | ~both) or np.any(within < 0.0):
+            return None
+        return Steps(within, onward, kernel, follows)
 
 
 @dataclass(frozen=True)
@@ -73,19 +110,39 @@ class StrokeCovariance:
         diagonal = white[:, None, None] ** 2 / (self.rows * self.averaged)
         if np.any(correlated > 0.0):
             log_rho = -self.dt / time[:, None]
-            rho = np.exp(log_rho)[:, :, None]
-            n = self.rows
-            series = -np.expm1(n * log_rho[:, :, None]) / (1.0 - rho)
-            mean = series / n
+            mean, own = _of_means(self.rows, log_rho[:, :, None])
             cross = np.exp(self.lag * log_rho[:, :, None, None]) * mean[:, :, :, None] * mean[:, :, None, :]
             upper = np.triu(np.ones((m, m)), 1) * ~(pad[:, :, None] | pad[:, None, :])
             cross *= upper
-            own = (n * (1.0 + rho) / (1.0 - rho) - 2.0 * rho * series / (1.0 - rho)) / n**2
             variance = correlated[:, None, None] ** 2
             result = result + variance[..., None] * (cross + np.swapaxes(cross, 2, 3))
             diagonal = diagonal + variance * own
         result[:, :, np.arange(m), np.arange(m)] += np.where(pad, 1.0, diagonal)
         return np.asarray(result)
+
+    @cached_property
+    def steps(self) -> Steps | None:
+        """One bin after the other; None where that is not all (a way that turns back inside a stroke)."""
+        return Steps.of(self.lag, self.rough, ~self.kind_pad)
+
+    def parts(self, steps: Steps, white: Array, correlated: Array, time: Array, rough: Array) -> Parts:
+        """:meth:`matrix` as its Markov parts, of batch shape (B, K)."""
+        n, sds = self.rows.T[:, None], [sd[:, None] for sd in (white, correlated, rough)]
+        own = sds[0] ** 2 / (n * self.averaged) + sds[2] ** 2
+        found = []
+        if np.any(correlated > 0.0):
+            log_rho = -self.dt / time[:, None]
+            mean, noise = _of_means(n, log_rho)
+            own = own + sds[1] ** 2 * noise
+            within, onward = (np.exp(rows[:, None] * log_rho) for rows in (steps.within, steps.onward))
+            onward[:-1] *= steps.follows[:-1, None] * mean[1:] / mean[:-1]
+            found.append((sds[1] ** 2 * mean**2, within, onward))
+        if np.any(rough > 0.0):
+            alike = np.ones_like(own)
+            found.append((sds[2] ** 2 * alike, alike, steps.kernel[:, None] * alike))
+        shared, within, onward = (np.stack(part, axis=1) for part in zip(*found, strict=True))
+        seen = ~self.kind_pad.T[:, None]
+        return Parts(np.where(seen, own, 1.0), shared * seen[:, None], within, onward)
 
     @cached_property
     def place(self) -> NDArray[np.int64] | slice:
@@ -142,6 +199,14 @@ def _kinds(
             kind[s] = len(first)
             first.append(s)
     return np.array(first), kind
+
+
+def _of_means(rows: Array, log_rho: Array) -> tuple[Array, Array]:
+    """AR(1) of variance 1, means of n rows: Σ ρ^i / n over a bin's rows, and the mean's own variance."""
+    rho = np.exp(log_rho)
+    series = -np.expm1(rows * log_rho) / (1.0 - rho)
+    own = (rows * (1.0 + rho) / (1.0 - rho) - 2.0 * rho * series / (1.0 - rho)) / rows**2
+    return series / rows, own
 
 
 def fast_noise_covariance(

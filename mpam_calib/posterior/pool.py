@@ -7,13 +7,17 @@ import multiprocessing
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from multiprocessing.pool import Pool
+from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
 from mpam_calib.posterior.collapsed import Collapsed
+
+Task = TypeVar("Task")
+Found = TypeVar("Found")
 
 _TARGET: Collapsed | None = None
 
@@ -47,9 +51,25 @@ def _keep_freed_memory() -> None:
     mallopt(trim_threshold, 1 << 30)
 
 
+class Inline:
+    """What stands for a pool inside another pool's worker, which may have no processes of its own."""
+
+    def map(self, work: Callable[[Task], Found], tasks: Iterable[Task], chunksize: int = 1) -> list[Found]:
+        """One task after the other, here."""
+        return [work(task) for task in tasks]
+
+
 @contextmanager
-def workers(target: Collapsed, wanted: int) -> Iterator[Pool]:
+def workers(target: Collapsed, wanted: int) -> Iterator[Pool | Inline]:
     """A pool of at most ``wanted`` workers that hold the target."""
+    global _TARGET
+    if multiprocessing.current_process().daemon:
+        before, _TARGET = _TARGET, target
+        try:
+            yield Inline()
+        finally:
+            _TARGET = before
+        return
     method = "fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn"
     count = max(1, min(wanted, os.cpu_count() or 1))
     with multiprocessing.get_context(method).Pool(count, initializer=_adopt, initargs=(target,)) as pool:

@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 FREEDOM = 8.0
 """Degrees of freedom: heavier tails than any posterior here, so that no tail is left out."""
+CLOSE_FREEDOM = 20.0
+"""The same for components that were fitted to many draws; others beside them cover the tails."""
 EM_ROUNDS = 25
 PULL = 0.02
 """Share of all draws that counts towards each component."""
@@ -20,25 +22,33 @@ PULL = 0.02
 
 @dataclass(frozen=True)
 class StudentMixture:
-    """``means`` (K, d), Cholesky factors ``roots`` (K, d, d) and ``shares`` (K,) that add up to one."""
+    """``means`` (K, d), Cholesky factors ``roots`` (K, d, d) and ``shares`` (K,) that add up to one.
+
+    ``freedom``: each component's degrees of freedom, or those of all.
+    """
 
     means: Array
     roots: Array
     shares: Array
+    freedom: tuple[float, ...] = (FREEDOM,)
 
     @staticmethod
-    def build(means: list[Array], covariances: list[Array], shares: Array | None = None) -> StudentMixture:
+    def build(
+        means: list[Array],
+        covariances: list[Array],
+        shares: Array | None = None,
+        freedom: tuple[float, ...] = (FREEDOM,),
+    ) -> StudentMixture:
         """From means (d,), covariances (d, d) and shares, equal where they are not given."""
         weights = np.ones(len(means)) if shares is None else shares
-        return StudentMixture(
-            np.stack(means), np.linalg.cholesky(np.stack(covariances)), weights / weights.sum()
-        )
+        roots = np.linalg.cholesky(np.stack(covariances))
+        return StudentMixture(np.stack(means), roots, weights / weights.sum(), freedom)
 
     def draw(self, n: int, rng: np.random.RandomState, widen: float = 1.0) -> Array:
         """n points (n, d); ``widen`` multiplies the scale."""
         which = rng.choice(len(self.means), size=n, p=self.shares)
-        d = self.means.shape[1]
-        z = rng.standard_normal((n, d)) / np.sqrt(rng.chisquare(FREEDOM, size=(n, 1)) / FREEDOM)
+        freedom = np.broadcast_to(self.freedom, self.shares.shape)[which, None]
+        z = rng.standard_normal((n, self.means.shape[1])) / np.sqrt(rng.chisquare(freedom) / freedom)
         return np.asarray(self.means[which] + widen * np.einsum("nij,nj->ni", self.roots[which], z))
 
     def log_density(self, x: Array) -> Array:
@@ -48,12 +58,9 @@ class StudentMixture:
         whitened = np.linalg.solve(self.roots, np.moveaxis(delta, 0, -1))
         square = np.sum(whitened**2, axis=1).T
         log_det = np.sum(np.log(np.diagonal(self.roots, axis1=1, axis2=2)), axis=1)
-        norm = (
-            special.gammaln((FREEDOM + d) / 2)
-            - special.gammaln(FREEDOM / 2)
-            - d / 2 * np.log(FREEDOM * np.pi)
-        )
-        each = norm - log_det - (FREEDOM + d) / 2 * np.log1p(square / FREEDOM)
+        v = np.broadcast_to(self.freedom, self.shares.shape)
+        norm = special.gammaln((v + d) / 2) - special.gammaln(v / 2) - d / 2 * np.log(v * np.pi)
+        each = norm - log_det - (v + d) / 2 * np.log1p(square / v)
         result: Array = special.logsumexp(each + np.log(self.shares), axis=1)
         return result
 

@@ -22,8 +22,8 @@ Array = NDArray[np.float64]
 
 ENSEMBLES = 4
 BLOCK = 40
-PATIENCE = 1.2
-"""Factor by which the draws must grow before they are looked at again: a look costs as much as they do."""
+PATIENCE = 1.2, 1.5
+"""Least and most by which the draws grow before they are looked at again: a look costs as much as they do."""
 MAX_STEPS = 4000
 """Default budget of steps that count, for each ensemble."""
 
@@ -102,7 +102,7 @@ def sample(
             if checkpoint:
                 checkpoint.save("warm_up", warm)
         states = warm.states
-        steps = checked = 0
+        steps = due = 0
         while True:
             name = f"block_{len(blocks):05d}"
             block: list[Block] | None = checkpoint.load(name) if checkpoint else None
@@ -113,12 +113,12 @@ def sample(
             states = [b.state for b in block]
             blocks.append(block)
             steps += len(block[0].chain)
-            if steps < checked * PATIENCE and steps + BLOCK <= max_steps:
+            if steps < due and steps + BLOCK <= max_steps:
                 continue
             chain = np.concatenate([np.stack([b.chain for b in part]) for part in blocks], axis=1)
             figures = diagnose_chains(chain)
-            checked = steps
             ess = float(min(figures.ess_bulk.min(), figures.ess_tail.min()))
+            due = round(steps * min(max(PATIENCE[0], ess_wanted / ess), PATIENCE[1]))
             tell(Progress("sampling", steps, float(figures.rhat.max()), ess, min(ess / ess_wanted, 1.0)))
             enough = figures.meets(ess_wanted)
             if enough or steps + BLOCK > max_steps:

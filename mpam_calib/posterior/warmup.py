@@ -3,7 +3,7 @@
 Laplace's covariance at the modes starts it; weighted draws from it refit it (adaptive importance
 sampling), with a few components for a posterior that is askew. Where too few of them carry weight, rounds
 of the ensembles themselves refit it, climbing again from any walker that found a better place. A last round
-lets the over-dispersed starts settle.
+lets the over-dispersed starts settle, and its many draws fit the proposal that is kept.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.ensembles import Block, EnsembleState
 from mpam_calib.posterior.mode import Mode, climb, curvature
-from mpam_calib.posterior.proposal import StudentMixture, fit_normals
+from mpam_calib.posterior.proposal import CLOSE_FREEDOM, FREEDOM, StudentMixture, fit_normals
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,14 @@ def _with_fit(modes: list[Mode], x: Array, weight: Array) -> StudentMixture:
     fitted = fit_normals(x, weight, count)
     of_modes = np.full(len(means), MODES_SHARE / len(means))
     shares = np.concatenate([of_modes, (1.0 - MODES_SHARE) * fitted[2]])
-    return StudentMixture.build([*means, *fitted[0]], [*covariances, *fitted[1]], shares)
+    freedom = (FREEDOM,) * len(means) + (FREEDOM if count == 1 else CLOSE_FREEDOM,) * count
+    return StudentMixture.build([*means, *fitted[0]], [*covariances, *fitted[1]], shares, freedom)
+
+
+def _with_walkers(modes: list[Mode], blocks: list[Block]) -> StudentMixture:
+    """What the walkers drew in the second half of their blocks, and a little of the modes' curvature."""
+    drawn = np.concatenate([b.chain[len(b.chain) // 2 :].reshape(-1, b.chain.shape[2]) for b in blocks])
+    return _with_fit(modes, drawn, np.full(len(drawn), 1.0 / len(drawn)))
 
 
 def _weigh(modes: list[Mode], evaluate: Evaluate, seed: int) -> tuple[StudentMixture, list[float]]:
@@ -123,8 +130,8 @@ def warm_up(
         # The first round still carries the wide starts.
         if 0 < number < rounds - 1:
             modes = _climb_again(target, blocks, modes)
-            drawn = np.concatenate(
-                [b.chain[len(b.chain) // 2 :].reshape(-1, b.chain.shape[2]) for b in blocks]
-            )
-            mixture = _with_fit(modes, drawn, np.full(len(drawn), 1.0 / len(drawn)))
+            mixture = _with_walkers(modes, blocks)
+    # Walkers that hardly moved are still their wide starts.
+    if accepted[-1] >= ENOUGH:
+        mixture = _with_walkers(modes, blocks)
     return WarmUp(states, mixture, modes, accepted)

@@ -6,11 +6,13 @@ ECDF must stay inside a band that holds simultaneously along the ECDF and over a
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
+from multiprocessing import get_context
 
 import numpy as np
 from model import build
 from scipy import stats
+from threadpoolctl import threadpool_limits
 
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.readings import Readings
@@ -136,11 +138,19 @@ def outside(names: list[str], ranks: Array, level: float = 0.01) -> dict[str, fl
 
 
 def run(declared: dict, options: Options, replicates: int, **shape: float) -> tuple[list[str], Array, Array]:
-    """Ranks as they are and of a posterior narrowed by 20 %."""
-    kept, narrow = [], []
-    names: list[str] = []
-    for seed in range(replicates):
-        names, ranks = replicate(declared, options, seed, (1.0, 0.8), **shape)
-        kept.append(ranks[0])
-        narrow.append(ranks[1])
-    return names, np.array(kept), np.array(narrow)
+    """Ranks as they are and of a posterior narrowed by 20 %.
+
+    Two processes share the replicates; each has its own seed, so that it does not matter which does what.
+    """
+    one = partial(_narrowed_by_a_fifth, declared, options, shape)
+    with get_context("fork").Pool(2, initializer=threadpool_limits, initargs=(1,)) as pool:
+        found = pool.map(one, range(replicates), chunksize=1)
+    names = found[0][0]
+    ranks = np.stack([each for _, each in found])
+    return names, ranks[:, 0], ranks[:, 1]
+
+
+def _narrowed_by_a_fifth(
+    declared: dict, options: Options, shape: dict[str, float], seed: int
+) -> tuple[list[str], Array]:
+    return replicate(declared, options, seed, (1.0, 0.8), **shape)

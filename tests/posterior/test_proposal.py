@@ -33,6 +33,16 @@ def test_two_components_have_equal_weight():
     assert np.exp(mixture().log_density(x)) == pytest.approx(0.5 * (parts[0] + parts[1]), rel=1e-12)
 
 
+def test_each_component_may_have_tails_of_its_own():
+    made = StudentMixture.build(MEANS, SPREADS, np.array([0.3, 0.7]), (8.0, 20.0))
+    x = np.random.default_rng(0).normal(0.0, 4.0, (200, 2))
+    parts = [stats.multivariate_t(m, s, df=v).pdf(x) for m, s, v in zip(MEANS, SPREADS, (8, 20), strict=True)]
+    assert np.exp(made.log_density(x)) == pytest.approx(0.3 * parts[0] + 0.7 * parts[1], rel=1e-12)
+    drawn = made.draw(200_000, np.random.RandomState(3))
+    weight = np.exp(TRUTH.logpdf(drawn) - made.log_density(drawn))
+    assert abs(weight.mean() - 1.0) < 4.0 * weight.std() / np.sqrt(len(weight))
+
+
 def test_the_density_integrates_to_one():
     """Importance sampling from a wide Gaussian; and over a line in one dimension."""
     wide = stats.multivariate_normal([1.5, 0.0], 36.0 * np.eye(2))
