@@ -15,7 +15,7 @@ def select(
     specimen: Annotated[Path, typer.Argument(help="specimen folder or its specimen.toml")],
     output: Annotated[Path, typer.Option("-o", "--output", help="the RUN folder to write")],
     seed: Annotated[int, typer.Option(help="seed of every random choice", min=0)] = 0,
-    replicates: Annotated[int, typer.Option(help="replicates of the confusion matrix", min=1)] = 8,
+    replicates: Annotated[int, typer.Option(help="replicates of the confusion matrix (0: none)", min=0)] = 8,
 ) -> None:
     """Rank orders, laws, frictions, kinematics and strain conventions by evidence and held-out levels."""
     from mpam_calib.cli.progress import stage_progress

@@ -18,11 +18,14 @@ from mpam_calib.criticism.problem import SIZE_PRIOR, Problem
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.posterior.bridge import Bridge, bridge_evidence
 from mpam_calib.posterior.evidence import Evidence, integrate
+from mpam_calib.posterior.mode import Mode
 
 Array = NDArray[np.float64]
 
-NEGLIGIBLE = 7.0
-"""Nats below the best size at which Laplace's figure will do."""
+NEGLIGIBLE, NEGLIGIBLE_ELSEWHERE = 5.0, 10.0
+"""Nats below the best size at which Laplace's figure will do; and at which other priors are not tried."""
+SETTLES = 7
+"""Parameters up to which the rule of quadrature settles; in more it is left at Laplace's figure."""
 WIDTHS = {
     "as declared": (1.0, 1.0),
     "moduli halved": (0.5, 1.0),
@@ -49,9 +52,11 @@ def log_evidence_by_quadrature(
 
 
 def weigh(problem: Problem, blueprint: Blueprint, fits: list[Fit], seed: int) -> Weighed:
-    """Quadrature and, for the sizes that matter, a bridge."""
+    """Quadrature and, for the sizes that matter, a bridge; an infinite error where none could be built."""
     terms, inner = _sizes(problem, blueprint, fits, (1.0, 1.0))
     quadrature = float(np.logaddexp.reduce(list(terms.values())))
+    if not inner:
+        return Weighed(quadrature, Bridge(quadrature, float("inf")))
     bridged, variance = dict(terms), 0.0
     for size, (hypothesis, found) in inner.items():
         value, error = bridge_evidence(hypothesis, found, seed)
@@ -65,21 +70,31 @@ def _sizes(
     problem: Problem, blueprint: Blueprint, fits: list[Fit], widths: tuple[float, float]
 ) -> tuple[dict[int, float], dict[int, tuple[Hypothesis, Evidence]]]:
     """Terms of the sum by size, and the densities behind those that were integrated."""
+    terms = {f.size: f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits}
+    best = max(terms.values())
     declared = widths == WIDTHS["as declared"]
-    all_of = {f.size: Hypothesis(problem, blueprint, f, *widths) for f in fits}
-    # Under other priors the fits' own evidences do not say which sizes matter.
-    modes = {} if declared else {size: hypothesis.mode() for size, hypothesis in all_of.items()}
-    laplace = {f.size: f.log_evidence if declared else modes[f.size].log_evidence for f in fits}
-    terms = {size: value + log(SIZE_PRIOR[size]) for size, value in laplace.items()}
+    # Under other priors the fits' own evidences say only roughly which sizes matter.
+    within = NEGLIGIBLE if declared else NEGLIGIBLE_ELSEWHERE
+    modes: dict[int, tuple[Hypothesis, Mode]] = {}
+    for found in fits:
+        if terms[found.size] < best - within:
+            continue
+        hypothesis = Hypothesis(problem, blueprint, found, *widths)
+        few = len(hypothesis.parameters) <= SETTLES
+        mode = hypothesis.fitted_mode() if declared and few else hypothesis.mode()
+        modes[found.size] = hypothesis, mode
+        if not (declared and few):
+            terms[found.size] = mode.log_evidence + log(SIZE_PRIOR[found.size])
+    terms = {size: value for size, value in terms.items() if declared or size in modes}
     best = max(terms.values())
     inner: dict[int, tuple[Hypothesis, Evidence]] = {}
-    for size, hypothesis in all_of.items():
-        if terms[size] < best - NEGLIGIBLE:
+    for size, (hypothesis, mode) in modes.items():
+        if terms[size] < best - NEGLIGIBLE or len(mode.u) > SETTLES:
             continue
-        found = integrate(hypothesis, modes[size] if size in modes else hypothesis.mode())
-        if np.isfinite(found.value):
-            terms[size] = found.value + log(SIZE_PRIOR[size])
-            inner[size] = hypothesis, found
+        integral = integrate(hypothesis, mode)
+        if integral.reliable:
+            terms[size] = integral.value + log(SIZE_PRIOR[size])
+            inner[size] = hypothesis, integral
     return terms, inner
 
 

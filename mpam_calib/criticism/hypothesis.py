@@ -7,7 +7,7 @@ and u is standard normal: the same density as :mod:`mpam_calib.criticism.fit` cl
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,11 +19,17 @@ from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.priors import Parameter
-from mpam_calib.posterior.mode import Mode, climb, curvature
+from mpam_calib.posterior.mode import LOOSEST, Mode, climb, curvature, evaluate
 
 Array = NDArray[np.float64]
 
 LOG_2PI = float(np.log(2.0 * np.pi))
+NEWTON_REACH = 0.5
+"""Standard deviations over which differences are taken."""
+NEWTON_STEPS, NEWTON_GAIN, SHORTER = 6, 0.005, (1.0, 0.5, 0.2, 0.05)
+"""Newton steps at most, the gain (nats) below which they end, and shares of a step that are tried."""
+SAME = 1e-11
+"""Share to which slopes must be sums of known shapes."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +45,7 @@ class Hypothesis:
     fit: Fit
     moduli_width: float = 1.0
     other_width: float = 1.0
+    _memo: dict[str, Array] = field(default_factory=dict, compare=False, repr=False)
 
     @cached_property
     def chain(self) -> Chain:
@@ -57,28 +64,68 @@ class Hypothesis:
 
     def log_posterior(self, u: Array) -> Array:
         """Log posterior density (B,) of coordinates u (B, d)."""
-        n, p, B = len(self.problem), self.chain.linear_size, len(u)
+        n, B = len(self.problem), len(u)
         values = {q.name: q.prior.from_normal(u[:, i : i + 1]) for i, q in enumerate(self.parameters)}
-        terms = self.chain.terms(values or {"": np.zeros((B, 1))}, self.problem.readings, self.guide)
-        fixed = np.broadcast_to(terms.fixed, (B, 2 * n))
-        columns = np.broadcast_to(terms.columns, (B, 2 * n, p))
-        stacked = np.empty((B, n, p + 1))
-        stacked[:, :, :p] = 0.5 * self.moduli_width * (columns[:, :n] + columns[:, n:])
-        stacked[:, :, p] = self.problem.force - 0.5 * (fixed[:, :n] + fixed[:, n:])
-        flat = np.moveaxis(stacked, 1, 0).reshape(n, -1)
-        white = (self.problem.axes[0] @ flat) / self.problem.spreads[self.fit.size][:, None]
-        white = np.moveaxis(white.reshape(n, B, p + 1), 1, 0)
-        full = np.swapaxes(white, 1, 2) @ white
-        gram, pull = full[:, :p, :p] + np.eye(p), full[:, :p, p]
+        fixed, slope, columns = self.chain.factored(
+            values or {"": np.zeros((B, 1))}, self.problem.readings, self.guide
+        )
+        fixed = np.broadcast_to(fixed, (B, 2 * n))
+        slope = np.broadcast_to(slope, (B, 2 * n))
+        residual = self._whitened((self.problem.force - 0.5 * (fixed[:, :n] + fixed[:, n:])).T).T
+        if len(columns) == 1:
+            gram, pull = self._products_of_slopes(slope, columns[0], residual)
+        else:
+            gram, pull = self._products(slope, columns, residual)
+        gram = gram + np.eye(gram.shape[1])
         mean = np.linalg.solve(gram, pull[..., None])[..., 0]
-        quadratic = full[:, p, p] - np.sum(pull * mean, axis=1)
+        quadratic = np.sum(residual**2, axis=1) - np.sum(pull * mean, axis=1)
         log_det = self.problem.log_dets[self.fit.size] + np.linalg.slogdet(gram)[1]
         prior = np.sum(u**2, axis=1) + u.shape[1] * LOG_2PI
         result: Array = -0.5 * (quadratic + log_det + n * LOG_2PI + prior)
         return np.where(np.isfinite(result), result, -np.inf)
 
+    def _whitened(self, columns: Array) -> Array:
+        """C^(−1/2) times columns (n, k)."""
+        result: Array = (self.problem.axes[0] @ columns) / self.problem.spreads[self.fit.size][:, None]
+        return result
+
+    def _products(self, slope: Array, columns: Array, residual: Array) -> tuple[Array, Array]:
+        """AᵀC⁻¹A (B, p, p) and AᵀC⁻¹r (B, p) for A = slope·columns and whitened residuals r (B, n)."""
+        n = len(self.problem)
+        full = slope[..., None] * columns
+        whole = 0.5 * self.moduli_width * (full[:, :n] + full[:, n:])
+        white = self._whitened(np.moveaxis(whole, 1, 0).reshape(n, -1)).reshape(n, len(slope), -1)
+        white = np.moveaxis(white, 1, 0)
+        across = np.swapaxes(white, 1, 2)
+        return across @ white, (across @ residual[..., None])[..., 0]
+
+    def _products_of_slopes(self, slope: Array, columns: Array, residual: Array) -> tuple[Array, Array]:
+        """The same where the columns (2n, p) are alike for all u, and slopes are sums of a few shapes."""
+        n, p = len(self.problem), columns.shape[1]
+        kept = self._memo.get("shapes")
+        # Rows of `kept` are orthonormal; what they miss of the slopes starts them anew.
+        if kept is None or np.abs(slope - (slope @ kept.T) @ kept).max() > SAME * np.abs(slope).max():
+            seen = slope if kept is None else np.concatenate([kept, slope])
+            _, size, shapes = np.linalg.svd(seen, full_matrices=False)
+            kept = self._memo["shapes"] = shapes[size > 0.1 * SAME * size[0]]
+            full = kept[:, :, None] * columns
+            whole = 0.5 * self.moduli_width * (full[:, :n] + full[:, n:])
+            self._memo["white"] = self._whitened(np.moveaxis(whole, 1, 0).reshape(n, -1))
+            self._memo["gram"] = self._memo["white"].T @ self._memo["white"]
+        share, r = slope @ kept.T, len(kept)
+        each = (share[:, :, None] * share[:, None, :]).reshape(-1, r * r)
+        gram = np.moveaxis(self._memo["gram"].reshape(r, p, r, p), 2, 1).reshape(r * r, p * p)
+        pull = np.einsum("bk,bkp->bp", share, (residual @ self._memo["white"]).reshape(-1, r, p))
+        return (each @ gram).reshape(-1, p, p), pull
+
+    def fitted_mode(self) -> Mode:
+        """Where the fit ended, with its own curvature: about the mode under the priors it was fitted with."""
+        d = len(self.fit.u)
+        top = float(self.log_posterior(self.fit.u[None])[0])
+        return Mode(self.fit.u, top, self.fit.covariance[:d, :d])
+
     def mode(self) -> Mode:
-        """The mode that a climb from the fit leads to."""
+        """The mode that Newton steps from the fit lead to, or a climb where they do not settle."""
         d = len(self.parameters)
         start = np.empty(d)
         for i, (own, fitted) in enumerate(zip(self.parameters, self.chain.parameters, strict=True)):
@@ -86,5 +133,38 @@ class Hypothesis:
         start = np.clip(np.nan_to_num(start), -FURTHEST, FURTHEST)
         if d == 0:
             return Mode(start, float(self.log_posterior(start[None])[0]), np.zeros((0, 0)))
+        return self._newton(start) or self._climbed(start)
+
+    def _newton(self, u: Array) -> Mode | None:
+        """Newton's method with differences along the fit's own axes; None where it gets nowhere."""
+        d = len(u)
+        axes = np.linalg.cholesky(self.fit.covariance[:d, :d])
+        i, j = np.triu_indices(d, 1)
+        e = np.eye(d)
+        offsets = np.concatenate([np.zeros((1, d)), e, -e, e[i] + e[j], -e[i] - e[j]])
+        for _ in range(NEWTON_STEPS):
+            f = evaluate(self, u + NEWTON_REACH * offsets @ axes.T)
+            if not np.all(np.isfinite(f)):
+                return None
+            top, up, down = f[0], f[1 : d + 1], f[d + 1 : 2 * d + 1]
+            both = f[2 * d + 1 :].reshape(2, -1).sum(axis=0)
+            hessian = np.diag(up + down - 2.0 * top)
+            hessian[i, j] = hessian[j, i] = 0.5 * (both + 2.0 * top - (up + down)[i] - (up + down)[j])
+            back = np.linalg.inv(axes)
+            values, turns = np.linalg.eigh(-(back.T @ hessian @ back) / NEWTON_REACH**2)
+            covariance = (turns / np.maximum(values, LOOSEST)) @ turns.T
+            step = covariance @ (back.T @ (up - down)) / (2.0 * NEWTON_REACH)
+            gain = 0.5 * float(step @ (back.T @ (up - down))) / (2.0 * NEWTON_REACH)
+            if gain < NEWTON_GAIN:
+                return Mode(u + step, float(top) + gain, covariance)
+            tried = np.clip(u + np.array(SHORTER)[:, None] * step, -FURTHEST, FURTHEST)
+            reached = evaluate(self, tried)
+            # Where no step leads uphill, the axes were too long for their slopes: these are shorter.
+            if reached.max() > top:
+                u = tried[int(reached.argmax())]
+            axes = np.linalg.cholesky(covariance)
+        return None
+
+    def _climbed(self, start: Array) -> Mode:
         u, top = climb(self, start)
         return Mode(u, top, curvature(self, u, top))

@@ -45,6 +45,9 @@ ALIKE = 0.9
 FORCE_MAP_NOISE = 0.003
 """Noise of a static reading as a share of the force scale, where no sensor sd is declared."""
 
+INHERITED = ("model", "lean", "bow", "axes", "spreads", "log_dets")
+"""What other forces do not change, or hardly."""
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -156,6 +159,12 @@ class Problem:
             kernel=self.kernel[np.ix_(index, index)],
             rows=None,
         )
+
+    def with_force(self, force: Array) -> Problem:
+        """The same design with other forces (n,), N; the covariance's factors and the bow are taken over."""
+        made = replace(self, force=force)
+        made.__dict__.update({name: getattr(self, name) for name in INHERITED})
+        return made
 
     def covariance(self, size: float) -> Array:
         """Noise and a remainder of ``size`` (share of the force scale), N²."""

@@ -11,7 +11,7 @@ from rig import sets
 from scipy import special, stats
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism import select as selection
+from mpam_calib.criticism import ranking, space, spread
 from mpam_calib.criticism.evidence import WIDTHS, log_evidence_by_quadrature, prior_sensitivity, weigh
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.hypothesis import Hypothesis
@@ -157,15 +157,15 @@ def test_quadrature_takes_twenty_milliseconds_for_a_model(
     problem: Problem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The whole space as ``select`` goes through it: most models are far below and keep Laplace's figure."""
-    monkeypatch.setattr(selection, "ORDERS", range(2, 5))
-    space = selection.model_space(specimen_of(next(
+    monkeypatch.setattr(space, "ORDERS", range(2, 5))
+    models = space.model_space(specimen_of(next(
         r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops"
     ).name))  # fmt: skip
-    monkeypatch.setattr(selection, "_PROBLEM", problem)
-    ranked = [r for s in space if (r := selection._rank(s)) is not None]
-    near = max(r.log_evidence for r in ranked) - selection.NEAR
+    monkeypatch.setattr(spread, "_PROBLEM", problem)
+    ranked = [r for s in models if (r := ranking.fitted(problem, s)) is not None]
+    near = max(r.log_evidence for r in ranked) - ranking.NEAR
     start = time.process_time()
-    after = [selection._integrate(r, near) for r in ranked]
+    after = [r if r.log_evidence < near else ranking.integrated(r) for r in ranked]
     spent = time.process_time() - start
     changed = sum(a.log_evidence != r.log_evidence for a, r in zip(after, ranked, strict=True))
     assert changed >= 1

@@ -8,11 +8,12 @@ from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism import select as module
+from mpam_calib.criticism import space
 from mpam_calib.criticism.fit import fit
 
 
 def test_the_simulated_model_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "ORDERS", range(1, 4))
+    monkeypatch.setattr(space, "ORDERS", range(1, 4))
     monkeypatch.setattr(module, "HELD_OUT", 3)
     monkeypatch.setattr(module, "CONFUSED", 2)
     recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")

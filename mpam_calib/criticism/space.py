@@ -1,0 +1,39 @@
+"""The models that ``select`` compares: every simulation that a specimen's files could carry."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from mpam_calib.specimen.declaration import Simulation
+from mpam_calib.specimen.recording import Specimen
+
+ORDERS = range(1, 7)
+LAWS = {"constant": 1, "linear": 2, "free": 2, "exponential": 3, "exponential_each": 4}
+"""Laws and the levels that each needs; a law after one that it holds as a special case."""
+
+
+def model_space(specimen: Specimen) -> list[Simulation]:
+    """Every such simulation; the declared effects and the moduli's source are kept.
+
+    Laws vary fastest and in the order of LAWS (:mod:`mpam_calib.criticism.ranking` relies on neither).
+    """
+    declared = specimen.simulation
+    frictions = ["none"]
+    parts = [p for p in (specimen.loops, specimen.force_map) if p is not None]
+    if any(np.any(p.branch == 1) and np.any(p.branch == -1) for p in parts):
+        frictions = ["coulomb", "none"] + (["strand"] if specimen.braid is not None else [])
+    orders: list[int] = list(ORDERS)
+    laws = [law for law, needed in LAWS.items() if len(specimen.levels_Pa) >= needed]
+    strains = ["engineering", "stretch"]
+    if declared.moduli != "loops":
+        orders, laws, strains = [declared.order], ["constant"], [declared.strain]
+    kinematics = ["inextensible_braid", "constant_thickness"]
+    return [
+        declared.model_copy(
+            update={"kinematics": k, "strain": s, "order": m, "friction": f, "law": w}
+            | ({"friction_by_pressure": False} if f != declared.friction else {})
+        )
+        for k, s, m, f, w in product(kinematics, strains, orders, frictions, laws)
+    ]

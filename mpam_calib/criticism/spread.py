@@ -1,0 +1,53 @@
+"""One problem, many tasks: the problem is handed to the workers once, not with every task."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from typing import Protocol, TypeVar
+
+from mpam_calib.criticism.problem import Problem
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+_PROBLEM: Problem | None = None
+
+
+class Spread(Protocol):
+    """``map`` whose functions find the problem with :func:`held_problem`; results in the tasks' order."""
+
+    def __call__(self, function: Callable[[T], R], tasks: Iterable[T], chunk: int = 1) -> Iterator[R]:
+        """Apply ``function`` to every task, ``chunk`` of them at a time to one worker."""
+
+
+@contextmanager
+def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
+    """Forked workers that hold the problem; with one worker everything stays in this process."""
+    # What all need is there before anyone is forked.
+    assert len(problem.axes[1]) == len(problem.bow) == len(problem.spreads[0]) and problem.log_dets
+    if workers == 1:
+        before = _PROBLEM
+        _hold(problem)
+        try:
+            yield lambda function, tasks, chunk=1: map(function, tasks)
+        finally:
+            _hold(before)
+        return
+    with ProcessPoolExecutor(
+        workers, mp_context=get_context("fork"), initializer=_hold, initargs=(problem,)
+    ) as pool:
+        yield lambda function, tasks, chunk=1: pool.map(function, tasks, chunksize=chunk)
+
+
+def held_problem() -> Problem:
+    """The problem that this process works on."""
+    assert _PROBLEM is not None
+    return _PROBLEM
+
+
+def _hold(problem: Problem | None) -> None:
+    global _PROBLEM
+    _PROBLEM = problem
