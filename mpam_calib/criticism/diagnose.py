@@ -22,6 +22,7 @@ from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import si_factor
 
 DRAWS = 4000
+WORKERS = 2
 Tell = Callable[[str, float], None]
 
 
@@ -67,15 +68,18 @@ def diagnose(
     blueprint = draw_blueprint(specimen, Options(nuisances=False, remainder=False), material)
     problem = build_problem(specimen, blueprint)
     tested = candidates(problem)
-    found = search(problem, tested.tested, lambda share: listener("searching", share))
+    found = search(problem, tested.tested, lambda share: listener("searching", share), workers=WORKERS)
     verdict = judge(found)
     for size in range(len(SIZES)):
         found.refit(verdict.standing, size)
     budget = misfit_budget(found, verdict.standing)
     gain = None
     if verdict.standing:
-        listener("measuring the gain", 0.0)
-        gain = measure_gain(problem, tested.tested, verdict.standing)
+
+        def share_done(share: float) -> None:
+            listener("measuring the gain", share)
+
+        gain = measure_gain(problem, tested.tested, verdict.standing, WORKERS, share_done)
     fits = [found.fits[s, found.best_size(s)] for s in (frozenset(), verdict.standing)]
     structure = list(zip(*(structure_tests(problem, f) for f in fits), strict=True))
     return Diagnosis(problem, tested, found, verdict, budget, gain, structure)

@@ -6,9 +6,8 @@ judged together: their joint predictive density knows that neighbours share the 
 
 from __future__ import annotations
 
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass
-from multiprocessing import get_context
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from mpam_calib.criticism.climb import STEP
 from mpam_calib.criticism.fit import Fit, chain_for, doubt_columns
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.search import Search, Set, search
+from mpam_calib.criticism.spread import held_problem, spread_over
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.model.blueprint import Blueprint
 
@@ -52,17 +52,27 @@ class _Fold:
     chosen: Set
 
 
-def measure_gain(problem: Problem, tested: tuple[str, ...], causes: Set, workers: int = 2) -> Gain | None:
-    """The gain of naming causes; None where nothing can be held out."""
+def measure_gain(
+    problem: Problem,
+    tested: tuple[str, ...],
+    causes: Set,
+    workers: int = 1,
+    tell: Callable[[float], None] | None = None,
+) -> Gain | None:
+    """The gain of naming causes; None where nothing can be held out. ``tell`` hears the share done."""
     by_cycle = bool(causes & set(HISTORY)) and len(np.unique(problem.cycle)) > 2
     groups = problem.cycle if by_cycle else problem.level
     labels = np.unique(groups)
     if len(labels) < 3:
         return None
     parts = [labels[i::FOLDS] for i in range(min(FOLDS, len(labels)))]
-    tasks = [(problem, tested, np.isin(groups, part)) for part in parts]
-    with ProcessPoolExecutor(workers, mp_context=get_context("fork")) as pool:
-        folds = list(pool.map(_fold, tasks))
+    tasks = [(tested, np.isin(groups, part)) for part in parts]
+    folds = []
+    with spread_over(problem, workers) as spread:
+        for fold in spread(_fold, tasks):
+            folds.append(fold)
+            if tell is not None:
+                tell(len(folds) / len(tasks))
     squares = [float(np.mean(np.concatenate([f.residuals[i] for f in folds]) ** 2)) for i in (0, 1)]
     covered = [float(np.mean(np.concatenate([f.inside[i] for f in folds]))) for i in (0, 1)]
     gains = np.array([f.elpd[1] - f.elpd[0] for f in folds])
@@ -79,8 +89,9 @@ def measure_gain(problem: Problem, tested: tuple[str, ...], causes: Set, workers
     )
 
 
-def _fold(task: tuple[Problem, tuple[str, ...], NDArray[np.bool_]]) -> _Fold:
-    problem, tested, held = task
+def _fold(task: tuple[tuple[str, ...], NDArray[np.bool_]]) -> _Fold:
+    tested, held = task
+    problem = held_problem()
     train = problem.take(~held)
     found = search(train, tested, width=FOLD_WIDTH)
     # What a verdict on these rows alone would report: in "unexplained", only what stands even so.

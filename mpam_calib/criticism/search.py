@@ -18,11 +18,14 @@ from scipy import linalg
 
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
+from mpam_calib.criticism.spread import Alone, Spread, held_problem, spread_over
 from mpam_calib.model.bend import BENDS
 from mpam_calib.model.effect import effect
 
 Array = NDArray[np.float64]
 Set = frozenset[str]
+Try = tuple[tuple[str, ...], dict[str, float]]
+"""Forms of the effects, and coordinates to start from."""
 
 RATE = 0.03
 """Prior odds of one more cause: a passenger must not come close to the set that it rides on."""
@@ -43,35 +46,47 @@ class Search:
 
     problem: Problem
     tested: tuple[str, ...]
+    spread: Spread
     fits: dict[tuple[Set, int], Fit] = field(default_factory=dict)
     polished: set[tuple[Set, int]] = field(default_factory=set)
 
-    def refit(self, effects: Set, size: int, starts: Iterable[dict[str, float]] = ({},)) -> Fit:
-        """The best exact refit of a set, from where its best parts ended and from some starts.
+    def refit(self, effects: Set, size: int) -> Fit:
+        """The best exact refit of a set, from where its best parts ended and from nothing.
 
         The search goes by bent forms, which hold most shapes; :meth:`polish` then tries the others one at
         a time, and larger sets take over what it chose. Having had a choice of forms is paid for.
         """
         key = (effects, size)
-        if key in self.fits:
-            return self.fits[key]
-        near = next((f for s in (size - 1, size + 1) if (f := self.fits.get((effects, s)))), None)
-        if near is not None and len(effects) > 1:
-            tries = [(_forms(near), _ended(near))]
-        elif len(effects) > 1:
-            # From where the best part ended, and from nothing: a part may have ended in a shape that only
-            # made up for what it lacked.
-            choice, start = self._from_parts(effects, size)
-            tries = [(choice, start), *(({e: flexible(e)[0] for e in effects} | choice, s) for s in starts)]
-        else:
-            tries = [({e: form}, s) for e in effects for form in flexible(e) for s in starts] or [({}, {})]
-        best: Fit | None = None
-        for choice, start in tries:
-            best = self._better(best, choice, size, start)
-        if best is None:
+        if key not in self.fits:
+            self.refit_all([key])
+        if key not in self.fits:
             raise np.linalg.LinAlgError(f"no fit of {sorted(effects)}")
-        self.fits[key] = best
-        return best
+        return self.fits[key]
+
+    def refit_all(self, keys: Iterable[tuple[Set, int]]) -> None:
+        """Refit many sets, each beside a remainder of one size; those that no climb can fit are left out."""
+        todo = [key for key in dict.fromkeys(keys) if key not in self.fits]
+        tasks = [(size, self._tries(effects, size)) for effects, size in todo]
+        for key, found in zip(todo, self.spread(_best_of, tasks, chunk=4), strict=True):
+            if found is not None:
+                self.fits[key] = found
+
+    def _tries(self, effects: Set, size: int) -> list[Try]:
+        """Forms and starts of a set's climbs."""
+        near = next((f for s in (size - 1, size + 1) if (f := self.fits.get((effects, s)))), None)
+        if not effects:
+            return [((), {})]
+        if len(effects) == 1:
+            names = _own_names(self.problem, effects)
+            starts = [{}, *(dict.fromkeys(names, value) for value in STARTS if names)]
+            return [((form,), start) for e in effects for form in flexible(e) for start in starts]
+        if near is not None:
+            return [(tuple(near.effects), _ended(near))]
+        # From where the best part ended, and from nothing: a part may have ended in a shape that only
+        # made up for what it lacked.
+        choice, start = self._from_parts(effects, size)
+        forms = tuple(choice[e] for e in sorted(effects))
+        return [(forms, start), (forms, {})]
 
     def _from_parts(self, effects: Set, size: int) -> tuple[dict[str, str], dict[str, float]]:
         """Forms and sizes of the best part of a set, and of the effect that it lacks."""
@@ -96,32 +111,11 @@ class Search:
         seen = [s for s in range(len(SIZES)) if (effects, s) in self.fits]
         return self.fits[effects, self.best_size(effects)] if seen else None
 
-    def polish(self, effects: Set, size: int) -> None:
+    def polish_all(self, keys: Iterable[tuple[Set, int]]) -> None:
         """Change one form of a set at a time, as long as that helps."""
-        if (effects, size) in self.polished:
-            return
-        self.polished.add((effects, size))
-        best: Fit | None = self.fits[effects, size]
-        for e in sorted(effects):
-            for form in forms_of(e):
-                assert best is not None
-                best = self._better(best, _forms(best) | {e: form}, size, _ended(best))
-        assert best is not None
-        self.fits[effects, size] = best
-
-    def _better(
-        self, best: Fit | None, choice: dict[str, str], size: int, start: dict[str, float]
-    ) -> Fit | None:
-        try:
-            with warnings.catch_warnings():
-                # On its way a climb may pass through shapes that no muscle has.
-                warnings.simplefilter("ignore", linalg.LinAlgWarning)
-                found = fit(self.problem, frozenset(choice.values()), size, start)
-        except np.linalg.LinAlgError:
-            return best
-        paid = sum(log(len(forms_of(e))) for e in choice)
-        found = replace(found, log_evidence=found.log_evidence - paid)
-        return found if best is None or found.log_evidence > best.log_evidence else best
+        todo = [k for k in dict.fromkeys(keys) if k in self.fits and k not in self.polished]
+        self.polished.update(todo)
+        self.fits.update(zip(todo, self.spread(_polished, [self.fits[key] for key in todo]), strict=True))
 
     def log_prior(self, effects: Set) -> float:
         """Log prior of a set (up to a constant)."""
@@ -163,6 +157,7 @@ def search(
     tested: tuple[str, ...],
     listener: Callable[[float], None] | None = None,
     width: int = WIDTH,
+    workers: int = 1,
 ) -> Search:
     """Search sets of up to three effects, the remainder always in play.
 
@@ -170,56 +165,76 @@ def search(
     partners, refitted exactly, and pruned again. ``listener`` is told the share that is done.
     """
     tell = listener or (lambda share: None)
-    found = Search(problem, tested)
-    nothing: Set = frozenset()
-    for size in range(len(SIZES)):
-        found.refit(nothing, size)
-    for number, identifier in enumerate(tested):
-        _try(found, frozenset([identifier]), range(len(SIZES)), curved=True)
-        tell(0.3 * (number + 1) / len(tested))
-    kept = _keep(found, 1, width)
-    for effects in kept:
-        _polish(found, effects)
-    singles = [next(iter(s)) for s in _keep(found, 1, PARTNERS)]
-    for k in range(2, LARGEST + 1):
-        tries = {s | {p} for s in kept for p in _partners(found, s, singles) if p not in s}
-        if k == 2 and width >= WIDTH:
-            # Small causes show only beside each other: all pairs are worth a look.
-            for pair in map(frozenset, combinations(tested, 2)):
-                _try(found, pair, (0,))
-        for number, effects in enumerate(sorted(tries, key=sorted)):
-            _try(found, effects, (0, 1))
-            tell(0.3 + 0.35 * (k - 2) + 0.35 * (number + 1) / len(tries))
-        kept = _keep(found, k, width)
-        for effects in kept:
-            _try(found, effects, range(len(SIZES)))
-            _polish(found, effects)
-    for _ in range(2):
-        for effects in found.sets[:LEADERS]:
+    every = range(len(SIZES))
+    with spread_over(problem, workers) as spread:
+        found = Search(problem, tested, spread)
+        singles = [frozenset([identifier]) for identifier in tested]
+        for size in every:  # beside one remainder after the other: a fit starts where its neighbour ended
+            found.refit_all((s, size) for s in [frozenset(), *singles])
+            tell(0.05 * (size + 1))
+        kept = _keep(found, 1, width)
+        _polish(found, kept)
+        best = [next(iter(s)) for s in _keep(found, 1, PARTNERS)]
+        for k in range(2, LARGEST + 1):
+            if k == 2 and width >= WIDTH:
+                # Small causes show only beside each other: all pairs are worth a look.
+                found.refit_all((frozenset(pair), 0) for pair in combinations(tested, 2))
+            tell(0.2 if k == 2 else 0.65)
+            tries = {s | {p} for s in kept for p in _partners(found, s, best) if p not in s}
+            for size in (0, 1):
+                found.refit_all((effects, size) for effects in sorted(tries, key=sorted))
+            tell(0.4 if k == 2 else 0.8)
+            kept = _keep(found, k, width)
+            for size in every:
+                found.refit_all((effects, size) for effects in kept)
+            _polish(found, kept)
+        for turn in range(2):
+            tell(0.9 + 0.05 * turn)
             # A leader's own parts must have been looked at, or it could hide a passenger.
-            for smaller in map(frozenset, combinations(sorted(effects), max(len(effects) - 1, 0))):
-                _try(found, smaller, range(len(SIZES)))
-                _polish(found, smaller)
-            _polish(found, effects)
+            leaders = found.sets[:LEADERS]
+            parts = [frozenset(p) for s in leaders for p in combinations(sorted(s), max(len(s) - 1, 0))]
+            for size in every:
+                found.refit_all((effects, size) for effects in parts)
+            _polish(found, [*parts, *leaders])
+    found.spread = Alone(problem)
     return found
 
 
-def _polish(found: Search, effects: Set) -> None:
-    for size in {0, found.best_size(effects)}:
-        if (effects, size) in found.fits:
-            found.polish(effects, size)
+def _best_of(task: tuple[int, list[Try]]) -> Fit | None:
+    """The best of some climbs."""
+    size, tries = task
+    best: Fit | None = None
+    for forms, start in tries:
+        best = _better(best, forms, size, start)
+    return best
 
 
-def _try(found: Search, effects: Set, sizes: Iterable[int], curved: bool = False) -> None:
-    starts: list[dict[str, float]] = [{}]
-    if curved:
-        names = _own_names(found.problem, effects)
-        starts += [dict.fromkeys(names, value) for value in STARTS] if names else []
-    for size in sizes:
-        try:
-            found.refit(effects, size, starts)
-        except np.linalg.LinAlgError:
-            continue
+def _polished(found: Fit) -> Fit:
+    """The fit with its forms changed one at a time."""
+    best = found
+    for e in sorted(_forms(found)):
+        for form in forms_of(e):
+            chosen = _forms(best) | {e: form}
+            best = _better(best, tuple(chosen.values()), found.size, _ended(best)) or best
+    return best
+
+
+def _better(best: Fit | None, forms: tuple[str, ...], size: int, start: dict[str, float]) -> Fit | None:
+    try:
+        with warnings.catch_warnings():
+            # On its way a climb may pass through shapes that no muscle has.
+            warnings.simplefilter("ignore", linalg.LinAlgWarning)
+            found = fit(held_problem(), frozenset(forms), size, start)
+    except np.linalg.LinAlgError:
+        return best
+    paid = sum(log(len(forms_of(form.partition(":")[0]))) for form in forms)
+    found = replace(found, log_evidence=found.log_evidence - paid)
+    return found if best is None or found.log_evidence > best.log_evidence else best
+
+
+def _polish(found: Search, sets: Iterable[Set]) -> None:
+    listed = [s for s in sets if any((s, size) in found.fits for size in range(len(SIZES)))]
+    found.polish_all((s, size) for s in listed for size in (0, found.best_size(s)))
 
 
 def flexible(identifier: str) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Protocol, TypeVar
 
@@ -40,6 +41,18 @@ def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
         workers, mp_context=get_context("fork"), initializer=_hold, initargs=(problem,)
     ) as pool:
         yield lambda function, tasks, chunk=1: pool.map(function, tasks, chunksize=chunk)
+
+
+@dataclass(frozen=True)
+class Alone:
+    """A :class:`Spread` in this process, for a problem whose workers are gone."""
+
+    problem: Problem
+
+    def __call__(self, function: Callable[[T], R], tasks: Iterable[T], chunk: int = 1) -> Iterator[R]:
+        """One task after another."""
+        with spread_over(self.problem, 1) as spread:
+            yield from spread(function, tasks)
 
 
 def held_problem() -> Problem:
