@@ -75,7 +75,7 @@ class Climb:
     @cached_property
     def _extra(self) -> Array:
         """The further columns, whitened."""
-        return np.asarray((self.problem.axes[0] @ self.extra) / self.problem.spreads[self.size][:, None])
+        return self.problem.white(self.extra, self.size)
 
     def values(self, u: Array) -> dict[str, Array]:
         """Values (B, 1) for coordinates u (B, d)."""
@@ -110,8 +110,7 @@ class Climb:
         whole, whole_columns = fixed[0], columns[0]
         fixed = 0.5 * (fixed[:, first] + fixed[:, second]) + problem.bow
         columns = 0.5 * (columns[:, first] + columns[:, second])
-        axes, spread = problem.axes[0], problem.spreads[self.size][:, None]
-        white = (axes @ np.column_stack([problem.force - fixed[0], columns[0]])) / spread
+        white = problem.white(np.column_stack([problem.force - fixed[0], columns[0]]), self.size)
         X = np.concatenate([white[:, 1:], self._extra], axis=1)
         # Given the sizes, the linear coordinates' optimum is exact.
         gram = X.T @ X + np.eye(X.shape[1])
@@ -123,7 +122,7 @@ class Climb:
             u=u,
             eta=best,
             residual=residual,
-            J=np.concatenate([(axes @ moved.T) / (STEP * spread), X], axis=1),
+            J=np.concatenate([problem.white(moved.T / STEP, self.size), X], axis=1),
             force=fixed[0] + columns[0] @ best[:p],
             guide=whole + whole_columns @ best[:p],
             objective=objective if np.isfinite(objective) else -np.inf,

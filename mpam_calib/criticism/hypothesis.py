@@ -86,8 +86,7 @@ class Hypothesis:
 
     def _whitened(self, columns: Array) -> Array:
         """C^(−1/2) times columns (n, k)."""
-        result: Array = (self.problem.axes[0] @ columns) / self.problem.spreads[self.fit.size][:, None]
-        return result
+        return self.problem.white(columns, self.fit.size)
 
     def _products(self, slope: Array, columns: Array, residual: Array) -> tuple[Array, Array]:
         """AᵀC⁻¹A (B, p, p) and AᵀC⁻¹r (B, p) for A = slope·columns and whitened residuals r (B, n)."""

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
+from scipy import linalg, sparse
 
 from mpam_calib.criticism.noise_level import NoiseLevel, noise_level
 from mpam_calib.criticism.rows import Rows, saturated, without
@@ -45,7 +45,9 @@ ALIKE = 0.9
 FORCE_MAP_NOISE = 0.003
 """Noise of a static reading as a share of the force scale, where no sensor sd is declared."""
 
-INHERITED = ("model", "lean", "bow", "axes", "spreads", "log_dets")
+SPARSE = 0.1
+"""Share of a factor's entries below which it is worth leaving the others out."""
+INHERITED = ("model", "lean", "bow", "root", "axes", "spreads", "log_dets")
 """What other forces do not change, or hardly."""
 
 
@@ -169,6 +171,24 @@ class Problem:
     def covariance(self, size: float) -> Array:
         """Noise and a remainder of ``size`` (share of the force scale), N²."""
         return self.noise + (size * self.force_scale) ** 2 * self.kernel
+
+    def white(self, columns: Array, size: int) -> Array:
+        """Columns (n, ...) whitened by the covariance of SIZES[size].
+
+        Without a remainder strokes are apart, and sparse factors do; with one the axes serve all sizes.
+        """
+        if size == 0:
+            return np.asarray(self.root @ columns)
+        result: Array = (self.axes[0] @ columns) / self.spreads[size].reshape(-1, *[1] * (columns.ndim - 1))
+        return result
+
+    @cached_property
+    def root(self) -> sparse.csr_array | Array:
+        """Inverse Cholesky factor (n, n) of the noise; dense where rests tie the strokes together."""
+        factor = linalg.cholesky(self.noise, lower=True)
+        inverse = linalg.solve_triangular(factor, np.eye(len(self)), lower=True)
+        thin = np.mean(np.abs(inverse) > 0.0) < SPARSE
+        return sparse.csr_array(inverse) if thin else np.ascontiguousarray(inverse)
 
     @cached_property
     def axes(self) -> tuple[Array, Array, float]:

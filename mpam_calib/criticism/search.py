@@ -277,8 +277,7 @@ def _gain(found: Search, effects: Set, partner: str, size: int) -> float:
     nothing = found.fits.get((frozenset(), size))
     if single is None or nothing is None:
         return -np.inf
-    axes, spread = found.problem.axes[0], found.problem.spreads[size]
-    signature = axes @ (single.force - nothing.force) / spread
-    residual = axes @ (found.problem.force - base.force - base.doubt) / spread
+    signature = found.problem.white(single.force - nothing.force, size)
+    residual = found.problem.white(found.problem.force - base.force - base.doubt, size)
     power = float(signature @ signature)
     return 0.5 * float(signature @ residual) ** 2 / power if power > 1e-12 else 0.0

@@ -28,7 +28,8 @@ class Spread(Protocol):
 def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
     """Forked workers that hold the problem; with one worker everything stays in this process."""
     # What all need is there before anyone is forked.
-    assert len(problem.axes[1]) == len(problem.bow) == len(problem.spreads[0]) and problem.log_dets
+    assert len(problem.axes[1]) == len(problem.bow) == len(problem.spreads[0]) == problem.root.shape[0]
+    assert problem.log_dets
     if workers == 1:
         before = _PROBLEM
         _hold(problem)
