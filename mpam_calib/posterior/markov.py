@@ -58,8 +58,8 @@ def factor(parts: Parts) -> Factor:
     # What the readings so far explain of the parts at the next one's start.
     known = np.zeros(both.shape[1:])
     for j in range(len(own)):
-        explained = known.sum(axis=0)
-        np.subtract(own[j], explained.sum(axis=0), out=variance[j])
+        explained = np.add.reduce(known)
+        np.subtract(own[j], np.add.reduce(explained), out=variance[j])
         explained *= within[j]
         np.subtract(shared[j], explained, out=explained)
         explained *= onward[j]

@@ -61,8 +61,7 @@ class StudentMixture:
         v = np.broadcast_to(self.freedom, self.shares.shape)
         norm = special.gammaln((v + d) / 2) - special.gammaln(v / 2) - d / 2 * np.log(v * np.pi)
         each = norm - log_det - (v + d) / 2 * np.log1p(square / v)
-        result: Array = special.logsumexp(each + np.log(self.shares), axis=1)
-        return result
+        return np.asarray(np.logaddexp.reduce(each + np.log(self.shares), axis=1))
 
 
 def fit_normals(x: Array, weight: Array, count: int) -> tuple[list[Array], list[Array], Array]:

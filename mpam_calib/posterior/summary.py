@@ -28,9 +28,10 @@ COLUMNS = [
 def summarise(listed: list[Reported], names: tuple[str, ...], sampling: Sampling) -> pd.DataFrame:
     """The table, one row per reported quantity.
 
-    A sampled parameter's R-hat and ESS are those of all its draws; what is computed from kept draws
-    (coefficients, z) is assessed on these, each ensemble one chain, and never credited with more
-    than the worst sampled parameter allows R-hat to hide.
+    A sampled parameter's R-hat and ESS are those of all its draws, the ESS at most the number of kept ones,
+    which its figures are computed from; what is computed from kept draws itself (coefficients, z) is assessed
+    on these, each ensemble one chain, and never credited with more than the worst sampled parameter allows
+    R-hat to hide.
     """
     chains = sampling.chain.shape[0]
     figures = sampling.diagnostics
@@ -39,7 +40,8 @@ def summarise(listed: list[Reported], names: tuple[str, ...], sampling: Sampling
         x = item.draws
         if item.name in names:
             i = names.index(item.name)
-            state = (figures.rhat[i], figures.ess_bulk[i], figures.ess_tail[i])
+            bulk, tail = (min(float(ess[i]), x.size) for ess in (figures.ess_bulk, figures.ess_tail))
+            state = (figures.rhat[i], bulk, tail)
         else:
             split = x.reshape(chains, -1)
             flat = np.ptp(split) == 0.0

@@ -128,7 +128,8 @@ def main() -> None:
         as_rows(specimen()).save(folder / "rows.npz")
         short = launch(f"ours white {WANTED} 1800 1", folder)
         ours = launch(f"ours white {10 * WANTED} 1800 1", folder)
-        full = launch(f"ours full {WANTED} 1800 1", folder)
+        short_full = launch(f"ours full {WANTED} 1800 1", folder)
+        full = launch(f"ours full {10 * WANTED} 1800 1", folder)
         for library in ("nutpie", "pymc"):
             launch(f"{library} rows 10", folder)  # fills their caches of compiled code
         others = {
@@ -140,7 +141,7 @@ def main() -> None:
             DENSER: launch(f"ours white {10 * WANTED} 18000 1", folder),
             "ten cycles": launch(f"ours white {10 * WANTED} 1800 10", folder),
         }
-        more_full = {DENSER: launch(f"ours full {WANTED} 18000 1", folder)}
+        more_full = {DENSER: launch(f"ours full {10 * WANTED} 18000 1", folder)}
     libraries = ", ".join(
         f"{n} {version(n)}" for n in ("emcee", "nutpie", "pymc", "pytensor", "numba", "numpy", "arviz")
     )
@@ -154,7 +155,7 @@ def main() -> None:
     print(line("mpam-calib, white noise", ours, short.process, None, start))
     for name, outcome in others.items():
         print(line(name, outcome, outcome.to_wanted(scaled=True), ours, start))
-    print(line("mpam-calib, correlated noise and remainder", full, full.process, None, start))
+    print(line("mpam-calib, correlated noise and remainder", full, short_full.process, None, start))
     print("\nLargest disagreement with ours, in Monte Carlo errors (means; sds; 11 parameters each):")
     for name, outcome in others.items():
         print("  {}: {:.1f}; {:.1f}".format(name, *disagreement(ours, outcome)))
@@ -190,7 +191,10 @@ def _targets(
         f"| ESS/s beside the better of the others, all rows | >= 5 | {rate:.1f} (per CPU s {per_cpu:.1f}) |"
     )
     print(f"| seconds to {WANTED:,}, theirs over ours | >= 3 | {sooner:.1f} (CPU s {sooner_cpu:.1f}) |")
-    print(f"| ESS/s with correlated noise and remainder | >= 1,000 | {full.rates[0]:,.0f} |")
+    print(
+        f"| ESS/s with correlated noise and remainder | >= 1,000 "
+        f"| {full.rates[0]:,.0f} (per CPU s {full.rates[1]:,.0f}) |"
+    )
     print(f"| peak memory, MiB | <= 300 | {largest:.0f} |")
     print(f"| CPU seconds of sampling, 180,000 rows over 18,000 | <= 1.2 | {growth:.2f} |")
 
