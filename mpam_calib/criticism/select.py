@@ -22,6 +22,7 @@ from mpam_calib.criticism.evidence import (
     weigh,
 )
 from mpam_calib.criticism.held_out import LEVEL_COLUMNS, hold_out, hold_out_each
+from mpam_calib.criticism.noise_scale import settle_noise
 from mpam_calib.criticism.odds import declared_or_beside, odds
 from mpam_calib.criticism.problem import build_problem
 from mpam_calib.criticism.ranking import Ranked, blueprint_of, fitted, rank_spread
@@ -82,10 +83,12 @@ def select(
     listener = tell or (lambda stage, share: None)
     declared = specimen.simulation
     blueprint = draw_blueprint(specimen, Options(nuisances=False, remainder=False), material)
-    with spread_over(build_problem(specimen, blueprint), workers) as spread:
+    space = model_space(specimen)
+    problem = settle_noise(build_problem(specimen, blueprint), space)
+    with spread_over(problem, workers) as spread:
         ranked = rank_spread(
             spread,
-            model_space(specimen),
+            space,
             tell=listener,
             always=lambda simulation: declared_or_beside(simulation, declared),
         )

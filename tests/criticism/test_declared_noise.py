@@ -1,0 +1,83 @@
+"""What ``[noise]`` declares, in the problem that hypotheses are compared on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from prediction.coverage import as_specimen, rig_case
+from rig.chain import force_of
+
+from mpam_calib.criticism.fit import fit
+from mpam_calib.criticism.problem import Problem, build_problem
+from mpam_calib.model.blueprint import Options, draw_blueprint
+from mpam_calib.specimen.declaration import Noise
+from mpam_calib.specimen.recording import ForceMap, Specimen
+
+GROWTH = 3.0
+
+
+def recorded(growth: float, declared: bool) -> Specimen:
+    """A rig muscle whose white noise grows with its force, 1.5 sds of the sensor at no force."""
+    muscle, rows, true, _, protocol = rig_case(1)
+    scale = build_problem_of(as_specimen(muscle, rows, true, protocol)).force_scale
+    noise = protocol.noise_N * np.random.default_rng(3).standard_normal(rows.count)
+    reading = force_of(muscle, rows) + noise * np.sqrt(1.0 + (growth * true / scale) ** 2)
+    return replace(as_specimen(muscle, rows, reading, protocol), noise=Noise(growth=declared))
+
+
+def build_problem_of(specimen: Specimen) -> Problem:
+    return build_problem(specimen, draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
+
+
+def spreads(problem: Problem) -> np.ndarray:
+    """Standardised residuals' sds of the rows with small and with large forces, for the true model."""
+    found = fit(problem, frozenset(), 0)
+    z = (problem.force - found.force) / np.sqrt(np.diagonal(problem.noise))
+    order = np.argsort(np.abs(problem.force))
+    return np.array([part.std() for part in np.array_split(z[order], 3)])[[0, 2]]
+
+
+def test_growing_noise_is_found_and_used() -> None:
+    problem = build_problem_of(recorded(GROWTH, declared=True))
+    assert problem.noise_level.growth == pytest.approx(GROWTH, rel=0.4)
+    low, high = spreads(problem)
+    assert 0.75 < low < 1.3
+    assert 0.75 < high < 1.3
+
+
+def test_undeclared_growth_is_not_modelled() -> None:
+    """One size for all: too large where the force is small, too small where it is large."""
+    problem = build_problem_of(recorded(GROWTH, declared=False))
+    assert problem.noise_level.growth == 0.0
+    low, high = spreads(problem)
+    assert high > 1.3 * low
+
+
+def test_declared_growth_that_is_not_there_changes_little() -> None:
+    with_it = build_problem_of(recorded(0.0, declared=True))
+    without = build_problem_of(recorded(0.0, declared=False))
+    ratio = np.sqrt(np.diagonal(with_it.noise) / np.diagonal(without.noise))
+    assert 0.9 < np.median(ratio) < 1.1
+    assert ratio.max() < 1.3
+
+
+def test_growth_of_static_readings() -> None:
+    """A force map beside loops: its readings' sd follows their own force."""
+    specimen = recorded(GROWTH, declared=True)
+    assert specimen.loops is not None and specimen.geometry is not None
+    rows = np.arange(0, len(specimen.loops.force_N), 9)
+    force_map = ForceMap(
+        pressure_Pa=specimen.loops.pressure_Pa[rows],
+        contraction=specimen.loops.displacement_m[rows] / specimen.geometry.L0,
+        force_N=specimen.loops.force_N[rows],
+        level=specimen.loops.level[rows],
+        branch=specimen.loops.branch[rows],
+        censored=np.zeros(len(rows), dtype=bool),
+    )
+    with_map = build_problem_of(replace(specimen, force_map=force_map))
+    level = with_map.noise_level
+    static = with_map.stroke < 0
+    wanted = level.total * np.sqrt(1.0 + (level.growth * with_map.force[static] / with_map.force_scale) ** 2)
+    np.testing.assert_allclose(np.sqrt(np.diagonal(with_map.noise)[static]), wanted, rtol=1e-9)
