@@ -48,7 +48,7 @@ class NoiseLevel:
 
 def noise_level(loops: Loops, model: Model) -> NoiseLevel | None:
     """Posterior mode of the noise under the model's priors; None where the strokes are too short to tell."""
-    found = _windows(loops)
+    found = noise_windows(loops)
     if found is None:
         return None
     names = [name for name in (WHITE, CORRELATED, TIME, GROWTH) if name in model.names]
@@ -75,8 +75,18 @@ def noise_level(loops: Loops, model: Model) -> NoiseLevel | None:
             likelihood = fast_noise_log_likelihood(scatter, loops.averaged, *sizes)
         return float(0.5 * u @ u - likelihood[0])
 
+    # Left to itself the search starts with steps of 0.00025 at zero, and ends there.
     start = np.zeros(len(names))
-    end = optimize.minimize(negative, start, method="Nelder-Mead", options={"maxiter": 600, "xatol": 1e-3})
+    end = optimize.minimize(
+        negative,
+        start,
+        method="Nelder-Mead",
+        options={
+            "maxiter": 600,
+            "xatol": 1e-3,
+            "initial_simplex": np.concatenate([start[None], np.eye(len(names))]),
+        },
+    )
     return NoiseLevel(*(float(v[0]) for v in values(end.x)))
 
 
@@ -106,7 +116,7 @@ class Windows(NamedTuple):
         return self.chunks.T @ self.chunks, len(self.chunks), self.contrast, self.dt
 
 
-def _windows(loops: Loops) -> Windows | None:
+def noise_windows(loops: Loops) -> Windows | None:
     """Detrended windows of consecutive rows inside strokes, away from their ends."""
     first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
     length = np.diff(np.append(first, len(loops.stroke)))

@@ -22,9 +22,9 @@ from mpam_calib.specimen.declaration import Simulation
 
 Array = NDArray[np.float64]
 
-LOG_SCALES = np.linspace(-0.5, 0.5, 11)
+LOG_SCALES = np.linspace(-0.8, 0.8, 17)
 """Logarithms of the scales that are tried."""
-WINDOWS_SD = 0.25
+WINDOWS_SD = 0.35
 """Standard deviation of the logarithm of the noise's sd as the windows give it."""
 MOST_ORDER = 5
 """Highest order of the models that are asked."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,12 +11,19 @@ from prediction.coverage import as_specimen, rig_case
 from rig.chain import force_of
 
 from mpam_calib.criticism.fit import fit
+from mpam_calib.criticism.noise_level import noise_level, noise_windows
 from mpam_calib.criticism.problem import Problem, build_problem
 from mpam_calib.model.blueprint import Options, draw_blueprint
+from mpam_calib.model.noise import CORRELATED, TIME, WHITE
+from mpam_calib.posterior.covariance import fast_noise_log_likelihood
+from mpam_calib.specimen import read
 from mpam_calib.specimen.declaration import Noise
 from mpam_calib.specimen.recording import ForceMap, Specimen
 
+DATASETS = Path(__file__).parents[2] / "datasets"
 GROWTH = 3.0
+MADE = (0.20, 0.15, 0.1)
+"""White and correlated sd (N) and correlation time (s) in ``datasets/rebuild.py``."""
 
 
 def recorded(growth: float, declared: bool) -> Specimen:
@@ -81,3 +89,25 @@ def test_growth_of_static_readings() -> None:
     static = with_map.stroke < 0
     wanted = level.total * np.sqrt(1.0 + (level.growth * with_map.force[static] / with_map.force_scale) ** 2)
     np.testing.assert_allclose(np.sqrt(np.diagonal(with_map.noise)[static]), wanted, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["mpam1_reconstructed", "mpam2_reconstructed"])
+def test_the_search_reaches_the_noise(name: str) -> None:
+    """What is found is at least as probable as the noise with which the data set was made."""
+    specimen = read(DATASETS / name)
+    assert specimen.loops is not None
+    model = build_problem_of(specimen).model
+    found, windows = noise_level(specimen.loops, model), noise_windows(specimen.loops)
+    assert found is not None
+    assert windows is not None
+    usual, priors = windows.usual(grows=False), {p.name: p.prior for p in model.parameters}
+
+    def log_posterior(*sizes: float) -> float:
+        values = [np.array([v]) for v in sizes]
+        u = [priors[n].to_normal(v)[0] for n, v in zip((WHITE, CORRELATED, TIME), values, strict=True)]
+        return float(fast_noise_log_likelihood(usual.scatter, 1, *values)[0]) - 0.5 * float(
+            np.square(u).sum()
+        )
+
+    assert log_posterior(found.white, found.correlated, found.time) >= log_posterior(*MADE)
+    assert found.total == pytest.approx(np.hypot(*MADE[:2]), rel=0.1)
