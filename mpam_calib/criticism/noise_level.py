@@ -1,16 +1,21 @@
-"""The sensor's noise by itself: read off what is too fast for any muscle, before any model is fitted."""
+"""The sensor's noise by itself: read off what is too fast for any muscle, before any model is fitted.
+
+Where the declaration lets the noise grow with the force, windows at small and at large forces tell how much.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
 from mpam_calib.model.model import Model
-from mpam_calib.model.noise import CORRELATED, TIME, WHITE
-from mpam_calib.posterior.covariance import fast_noise_log_likelihood
+from mpam_calib.model.noise import CORRELATED, GROWTH, TIME, WHITE, grown
+from mpam_calib.posterior.covariance import fast_noise_covariance, fast_noise_log_likelihood
+from mpam_calib.posterior.sites import chunk_log_likelihood, usual_chunks
 from mpam_calib.specimen.recording import Loops
 
 Array = NDArray[np.float64]
@@ -20,52 +25,99 @@ WINDOW, DEGREE = 32, 3
 """Windows of at most so many rows, detrended by a polynomial of this degree ..."""
 SHORT_DEGREE = 5
 """... or of this one, where a stroke is so short that it is one window."""
+USUAL = 4.0
+"""Multiple of the typical power above which a window holds more than noise."""
 FEWEST_PAIRS = 6
 """Pairs of repeated strokes that are enough to tell the noise from."""
 
 
 @dataclass(frozen=True)
 class NoiseLevel:
-    """White and correlated sd (N) and the latter's time constant (s)."""
+    """White and correlated sd (N) and the latter's time constant (s); how all of it grows with the force."""
 
     white: float
     correlated: float
     time: float
+    growth: float = 0.0
 
     @property
     def total(self) -> float:
-        """sd of one reading."""
+        """sd of one reading, at no force."""
         return float(np.hypot(self.white, self.correlated))
 
 
 def noise_level(loops: Loops, model: Model) -> NoiseLevel | None:
     """Posterior mode of the noise under the model's priors; None where the strokes are too short to tell."""
-    found = _windows(loops)
+    found = noise_windows(loops)
     if found is None:
         return None
-    scatter, count, contrast, dt = found
-    names = [name for name in (WHITE, CORRELATED, TIME) if name in model.names]
+    names = [name for name in (WHITE, CORRELATED, TIME, GROWTH) if name in model.names]
     priors = {p.name: p.prior for p in model.parameters}
+    scale = 1.0 if model.setting is None else model.setting.force_scale
+    found = found.usual(GROWTH in names)
+    scatter = found.scatter
 
     def values(u: Array) -> list[Array]:
         given = {name: priors[name].from_normal(u[i : i + 1]) for i, name in enumerate(names)}
-        absent = {WHITE: 1.0, CORRELATED: 0.0, TIME: 1.0}
+        absent = {WHITE: 1.0, CORRELATED: 0.0, TIME: 1.0, GROWTH: 0.0}
         return [given.get(name, np.array([absent[name]])) for name in absent]
 
     def negative(u: Array) -> float:
         if np.any(np.abs(u) > 12.0):
             return 1e12
-        likelihood = fast_noise_log_likelihood((scatter, count, contrast, dt), loops.averaged, *values(u))
+        *sizes, growth = values(u)
+        if GROWTH in names:
+            covariance = fast_noise_covariance(scatter, loops.averaged, *sizes)
+            likelihood = chunk_log_likelihood(
+                covariance, found.chunks, grown(growth[:, None], found.force, scale)
+            )
+        else:
+            likelihood = fast_noise_log_likelihood(scatter, loops.averaged, *sizes)
         return float(0.5 * u @ u - likelihood[0])
 
+    # Left to itself the search starts with steps of 0.00025 at zero, and ends there.
     start = np.zeros(len(names))
-    end = optimize.minimize(negative, start, method="Nelder-Mead", options={"maxiter": 600, "xatol": 1e-3})
-    white, correlated, time = (float(v[0]) for v in values(end.x))
-    return NoiseLevel(white, correlated, time)
+    end = optimize.minimize(
+        negative,
+        start,
+        method="Nelder-Mead",
+        options={
+            "maxiter": 600,
+            "xatol": 1e-3,
+            "initial_simplex": np.concatenate([start[None], np.eye(len(names))]),
+        },
+    )
+    return NoiseLevel(*(float(v[0]) for v in values(end.x)))
 
 
-def _windows(loops: Loops) -> tuple[Array, int, Array, float] | None:
-    """Scatter of detrended windows of consecutive rows inside strokes, away from their ends."""
+class Windows(NamedTuple):
+    """What the contrasts of windows see (k, dof), the windows' mean forces (k,), contrasts, time step (s)."""
+
+    chunks: Array
+    force: Array
+    contrast: Array
+    dt: float
+
+    def usual(self, grows: bool) -> Windows:
+        """Without bursts and snaps, which must not pass for noise.
+
+        They are far above the typical window, or above those of similar force where noise grows with it.
+        """
+        if grows:
+            kept = usual_chunks(self.chunks, self.force)
+            return self._replace(chunks=self.chunks[kept], force=self.force[kept])
+        power = np.mean(self.chunks**2, axis=1)
+        kept = power <= USUAL * np.median(power)
+        return self._replace(chunks=self.chunks[kept], force=self.force[kept])
+
+    @property
+    def scatter(self) -> tuple[Array, int, Array, float]:
+        """As the likelihood of fast noise takes it."""
+        return self.chunks.T @ self.chunks, len(self.chunks), self.contrast, self.dt
+
+
+def noise_windows(loops: Loops) -> Windows | None:
+    """Detrended windows of consecutive rows inside strokes, away from their ends."""
     first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
     length = np.diff(np.append(first, len(loops.stroke)))
     typical = int(np.median(length))
@@ -90,10 +142,10 @@ def _windows(loops: Loops) -> tuple[Array, int, Array, float] | None:
     if len(index) < 4:
         return None
     dt = float(np.median((loops.time_s[index[:, -1]] - loops.time_s[index[:, 0]]) / (size - 1)))
-    return _scatter(loops.force_N[index], degree, dt)
+    return _detrended(loops.force_N[index], loops.force_N[index].mean(axis=1), degree, dt)
 
 
-def _between_cycles(loops: Loops, first: Ints, length: Ints) -> tuple[Array, int, Array, float] | None:
+def _between_cycles(loops: Loops, first: Ints, length: Ints) -> Windows | None:
     """The same from differences of strokes that repeat each other: short strokes leave no other way.
 
     What the muscle does, and whatever is wrong with it, comes back in the next cycle; noise does not.
@@ -111,16 +163,12 @@ def _between_cycles(loops: Loops, first: Ints, length: Ints) -> tuple[Array, int
     rows = first[pairs][:, :, None] + np.arange(size)
     difference = (loops.force_N[rows[:, 0]] - loops.force_N[rows[:, 1]]) / np.sqrt(2.0)
     dt = float(np.median((loops.time_s[rows[:, 0, -1]] - loops.time_s[rows[:, 0, 0]]) / (size - 1)))
-    return _scatter(difference, DEGREE, dt)
+    return _detrended(difference, loops.force_N[rows].mean(axis=(1, 2)), DEGREE, dt)
 
 
-def _scatter(windows: Array, degree: int, dt: float) -> tuple[Array, int, Array, float]:
-    """Scatter of windows (k, size) less a polynomial, how many were kept, the contrasts, time step."""
+def _detrended(windows: Array, force: Array, degree: int, dt: float) -> Windows:
+    """Windows (k, size) less a polynomial, with their mean forces (k,)."""
     size = windows.shape[1]
     full, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, size), degree + 1), mode="complete")
     contrast = np.asarray(full[:, degree + 1 :], dtype=np.float64)
-    projected = windows @ contrast
-    # A burst or a snap must not pass for noise: windows far above the typical one are left out.
-    power = np.mean(projected**2, axis=1)
-    kept = power <= 4.0 * np.median(power)
-    return projected[kept].T @ projected[kept], int(kept.sum()), contrast, max(dt, 1e-9)
+    return Windows(windows @ contrast, force, contrast, max(dt, 1e-9))

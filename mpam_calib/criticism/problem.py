@@ -1,6 +1,7 @@
 """The data as every hypothesis sees them: reduced rows, their noise, and a remainder of several sizes.
 
-The noise is known before any model is fitted (:mod:`mpam_calib.criticism.noise_level`), so for each
+The noise is known before any model is fitted (:mod:`mpam_calib.criticism.noise_level`), growing with the
+force where it is declared to (and the recording tells: static readings alone do not), so for each
 size of the remainder the covariance is one fixed matrix, and a hypothesis is a small least-squares
 problem. The remainder is rich (many half-waves, apart for every branch and, more weakly, for every
 stroke and distant pressure), so that it can hold what nobody thought of.
@@ -19,6 +20,7 @@ from mpam_calib.criticism.noise_level import NoiseLevel, noise_level
 from mpam_calib.criticism.rows import Rows, saturated, without
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
+from mpam_calib.model.noise import grown
 from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.bins import LoopBins, bin_loops
 from mpam_calib.posterior.covariance import StrokeCovariance
@@ -168,6 +170,23 @@ class Problem:
         made.__dict__.update({name: getattr(self, name) for name in INHERITED})
         return made
 
+    def with_noise_scale(self, scale: float) -> Problem:
+        """The same with a noise whose sd is ``scale`` times as large."""
+        axes, powers, log_det = self.axes
+        level = self.noise_level
+        made = replace(
+            self,
+            noise=scale**2 * self.noise,
+            noise_level=replace(level, white=scale * level.white, correlated=scale * level.correlated),
+        )
+        made.__dict__.update({name: getattr(self, name) for name in ("model", "lean", "bow")})
+        made.__dict__["axes"] = (
+            axes / scale,
+            powers / scale**2,
+            log_det + 2.0 * len(self) * float(np.log(scale)),
+        )
+        return made
+
     def covariance(self, size: float) -> Array:
         """Noise and a remainder of ``size`` (share of the force scale), N²."""
         return self.noise + (size * self.force_scale) ** 2 * self.kernel
@@ -237,11 +256,13 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         layout = StrokeCovariance.build(bins)
         white, correlated, time = (np.array([v]) for v in (noise.white, noise.correlated, noise.time))
         padded = layout.matrix(white, correlated, time, np.zeros(1))[0][layout.kind]
-        full = _held(bins)
+        full = np.zeros((len(bins), len(bins)))
         for segment in range(bins.segments):
             rows = np.flatnonzero(bins.segment == segment)
             at = bins.position[rows]
-            full[np.ix_(rows, rows)] += padded[segment][np.ix_(at, at)]
+            full[np.ix_(rows, rows)] = padded[segment][np.ix_(at, at)]
+        larger = grown(np.array(noise.growth), bins.force, scale)
+        full = larger[:, None] * larger * full + _held(bins)
         keep = np.flatnonzero(~bins.slack)
         n = len(bins)
         low, high = bins.readings.take(keep), bins.readings.take(keep + n)
@@ -254,7 +275,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         noise = noise or NoiseLevel(sd, 0.0, 1.0)
         rows_of = points.readings.take(keep)
         parts.append((rows_of, rows_of, points.force[keep], np.full(len(keep), -1), np.zeros(0)))
-        blocks.append(sd**2 * np.eye(len(keep)))
+        blocks.append(np.diag((sd * grown(np.array(noise.growth), points.force[keep], scale)) ** 2))
     assert noise is not None
     low = Readings.join([part[0] for part in parts])
     high = Readings.join([part[1] for part in parts])

@@ -10,13 +10,14 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import log
+from math import log, pi
 
 import numpy as np
 from scipy import linalg
 
 from mpam_calib.criticism.evidence import log_evidence_by_quadrature
 from mpam_calib.criticism.fit import Fit, fit
+from mpam_calib.criticism.noise_scale import settle_noise
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
 from mpam_calib.criticism.spread import Spread, held_problem, spread_over
 from mpam_calib.model.blueprint import Blueprint
@@ -48,6 +49,9 @@ class Ranked:
     log_evidence: float
     error: float = float("nan")
 
+    ceiling: float = float("inf")
+    """Log likelihood (nats) that the fits reach."""
+
     @property
     def best(self) -> Fit:
         """The fit at the most probable size of the remainder."""
@@ -58,9 +62,10 @@ def rank(problem: Problem, space: Sequence[Simulation], *, workers: int = 2) -> 
     """The models of a space, most evidence first; those that cannot be fitted are left out.
 
     Those within NEAR nats of the best have their evidence by quadrature, the others by Laplace's
-    approximation. One worker means this process.
+    approximation. The noise is settled first (:mod:`mpam_calib.criticism.noise_scale`). One worker means
+    this process.
     """
-    with spread_over(problem, workers) as spread:
+    with spread_over(settle_noise(problem, space), workers) as spread:
         return rank_spread(spread, space)
 
 
@@ -72,15 +77,22 @@ def rank_spread(
     always: Callable[[Simulation], bool] = lambda simulation: False,
 ) -> list[Ranked]:
     """:func:`rank` by workers that hold the problem; ``always`` names models that are integrated anyhow."""
-    groups: dict[str, list[Simulation]] = {}
-    for simulation in space:
-        groups.setdefault(simulation.model_copy(update={"law": "linear"}).model_dump_json(), []).append(
-            simulation
-        )
-    ranked: list[Ranked] = []
-    for number, found in enumerate(spread(_fit_laws, groups.values(), 2)):
-        ranked += found
-        tell("ranking", (number + 1) / len(groups))
+    groups = _by_law(space)
+    plain: list[dict[str, Ranked | None]] = []
+    for number, found in enumerate(spread(_fit_plain, groups, 4)):
+        plain.append(found)
+        tell("ranking", (number + 1) / len(groups) / 2)
+    ranked = [r for found in plain for r in found.values() if r is not None]
+    if not ranked:
+        return []
+    top = max(r.log_evidence for r in ranked)
+    tasks = [
+        (group, _hopeful(found, top) or any(always(s) for s in group.values()))
+        for group, found in zip(groups, plain, strict=True)
+    ]
+    for number, rated in enumerate(spread(_fit_rates, tasks)):
+        ranked += rated
+        tell("ranking", 0.5 + (number + 1) / len(tasks) / 2)
     near = max(r.log_evidence for r in ranked) - NEAR
     wanted = [i for i, r in enumerate(ranked) if r.log_evidence >= near or always(r.simulation)]
     for number, (i, better) in enumerate(
@@ -96,21 +108,26 @@ def blueprint_of(problem: Problem, simulation: Simulation) -> Blueprint:
     return problem.blueprint.model_copy(update={"simulation": simulation})
 
 
-def fitted(problem: Problem, simulation: Simulation, shared: Ranked | None = None) -> Ranked | None:
+def fitted(
+    problem: Problem, simulation: Simulation, shared: Ranked | None = None, thorough: bool = True
+) -> Ranked | None:
     """A model with Laplace's evidence; None where no climb ends.
 
-    ``shared`` is the same model with rates that all moduli share, for a law with rates of their own.
+    ``shared`` is the same model with rates that all moduli share, for a law with rates of their own. A
+    ``thorough`` search for the rates takes several ways.
     """
     if simulation.law == EACH and shared is None:
         shared = fitted(problem, simulation.model_copy(update={"law": SHARED}))
     with warnings.catch_warnings():
         # Where a model is hopeless, its misfit outweighs every prior: nothing to be warned of.
         warnings.simplefilter("ignore", linalg.LinAlgWarning)
-        fits = _climbs(problem, simulation, shared)
+        fits = _climbs(problem, simulation, shared, thorough)
     if not fits:
         return None
     terms = [f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits]
-    return Ranked(simulation, fits, float(np.logaddexp.reduce(terms)))
+    n = len(problem)
+    reached = [-0.5 * (f.chi2 + problem.log_dets[f.size] + n * log(2.0 * pi)) for f in fits]
+    return Ranked(simulation, fits, float(np.logaddexp.reduce(terms)), ceiling=max(reached))
 
 
 def integrated(ranked: Ranked) -> Ranked:
@@ -120,7 +137,7 @@ def integrated(ranked: Ranked) -> Ranked:
     return replace(ranked, log_evidence=value)
 
 
-def _climbs(problem: Problem, simulation: Simulation, shared: Ranked | None) -> list[Fit]:
+def _climbs(problem: Problem, simulation: Simulation, shared: Ranked | None, thorough: bool) -> list[Fit]:
     """The best fit for each size of the remainder, from the largest down to where they have no more to say.
 
     Rates are found on the way down, which the larger remainder smooths; then back, each from the mode that
@@ -140,15 +157,17 @@ def _climbs(problem: Problem, simulation: Simulation, shared: Ranked | None) -> 
 
     rates = rate_names(simulation.law, simulation.order)
     for size in reversed(range(len(SIZES))):
-        starts = [*_from_shared(shared, simulation, size)]
-        if rates and found:
-            starts += _at(found.get(size + 1))
-        else:
-            starts += [{}, *STARTS.get(simulation.law, ())]
+        starts = _from_shared(shared, simulation, size)
+        if thorough or not starts:
+            starts += _at(found.get(size + 1)) if rates else []
+        if not starts:
+            starts = [{}, *(STARTS.get(simulation.law, ()) if thorough else ())]
+        elif rates and thorough and not found:
+            starts.append({})
         climb(size, starts)
         if size in found and found[size].log_evidence < max(f.log_evidence for f in found.values()) - SILENT:
             break
-    for size in sorted(found)[1:] if rates else ():
+    for size in sorted(found)[1:] if rates and thorough else ():
         climb(size, _at(found.get(size - 1)))
     return [found[size] for size in sorted(found)]
 
@@ -167,10 +186,39 @@ def _from_shared(shared: Ranked | None, simulation: Simulation, size: int) -> li
     return [at | {name: at[name.split("_")[0]] for name in rates} for at in starts]
 
 
-def _fit_laws(simulations: Sequence[Simulation]) -> list[Ranked]:
-    """Models that differ in their law alone."""
+def _by_law(space: Sequence[Simulation]) -> list[dict[str, Simulation]]:
+    """Models that differ in their law alone, by their law."""
+    groups: dict[str, dict[str, Simulation]] = {}
+    for simulation in space:
+        key = simulation.model_copy(update={"law": "linear"}).model_dump_json()
+        groups.setdefault(key, {})[simulation.law] = simulation
+    return list(groups.values())
+
+
+def _fit_plain(group: dict[str, Simulation]) -> dict[str, Ranked | None]:
+    """The laws without rates of a group."""
+    problem = held_problem()
+    return {law: fitted(problem, s) for law, s in group.items() if law not in (SHARED, EACH)}
+
+
+def _fit_rates(task: tuple[dict[str, Simulation], bool]) -> list[Ranked]:
+    """The laws with rates of a group, searched thoroughly or not."""
+    group, thorough = task
     problem = held_problem()
     found: dict[str, Ranked | None] = {}
-    for simulation in sorted(simulations, key=lambda s: s.law == EACH):
-        found[simulation.law] = fitted(problem, simulation, found.get(SHARED))
-    return [r for s in simulations if (r := found[s.law]) is not None]
+    for law in (SHARED, EACH):
+        if law in group:
+            found[law] = fitted(problem, group[law], found.get(SHARED), thorough)
+    return [r for r in found.values() if r is not None]
+
+
+def _hopeful(plain: dict[str, Ranked | None], top: float) -> bool:
+    """Whether rates could bring a group near the top.
+
+    No law of pressure fits the levels better than moduli of each level's own, and no evidence is above the
+    best likelihood.
+    """
+    free = plain.get("free")
+    if free is None:
+        return True
+    return free.ceiling >= top - NEAR

@@ -22,6 +22,7 @@ from mpam_calib.criticism.evidence import (
     weigh,
 )
 from mpam_calib.criticism.held_out import LEVEL_COLUMNS, hold_out, hold_out_each
+from mpam_calib.criticism.noise_scale import settle_noise
 from mpam_calib.criticism.odds import declared_or_beside, odds
 from mpam_calib.criticism.problem import build_problem
 from mpam_calib.criticism.ranking import Ranked, blueprint_of, fitted, rank_spread
@@ -29,6 +30,7 @@ from mpam_calib.criticism.space import model_space
 from mpam_calib.criticism.spread import held_problem, spread_over
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
+from mpam_calib.specimen.declaration import Simulation
 from mpam_calib.specimen.recording import Specimen
 
 Array = NDArray[np.float64]
@@ -48,8 +50,8 @@ class Selection:
     """``models`` with the columns of ``models.csv`` (best first) and more about the leading ones.
 
     ``odds`` has a row for each order, law, friction ... (:func:`mpam_calib.criticism.odds.odds`).
-    ``levels``: each level predicted from the others by the first model and by the declared one (column
-    ``model``: "first", "declared"; then LEVEL_COLUMNS).
+    ``levels``: each level predicted from the others by the first model, by the one with the best density at
+    levels left out and by the declared one (``model``: "first", "held out", "declared"; then LEVEL_COLUMNS).
     ``confusion`` (k, k): share of replicates simulated from row's model in which column's won; NaN where
     there were none. ``sensitivity``: their evidences and shares under other prior widths, a row for each
     model and width. ``disagreement`` (nats): the largest difference between quadrature and bridge among them.
@@ -82,10 +84,12 @@ def select(
     listener = tell or (lambda stage, share: None)
     declared = specimen.simulation
     blueprint = draw_blueprint(specimen, Options(nuisances=False, remainder=False), material)
-    with spread_over(build_problem(specimen, blueprint), workers) as spread:
+    space = model_space(specimen)
+    problem = settle_noise(build_problem(specimen, blueprint), space)
+    with spread_over(problem, workers) as spread:
         ranked = rank_spread(
             spread,
-            model_space(specimen),
+            space,
             tell=listener,
             always=lambda simulation: declared_or_beside(simulation, declared),
         )
@@ -98,8 +102,8 @@ def select(
         widened = np.array(list(spread(_widen, leading)))
         listener("holding out", 0.0)
         held = list(spread(hold_out, ranked[:HELD_OUT]))
-        own = [r for r in ranked if r.simulation == declared]
-        apart = list(spread(hold_out_each, [ranked[0], *own]))
+        chosen = _apart(ranked, held, declared)
+        apart = dict(zip(chosen, spread(hold_out_each, chosen.values()), strict=True))
         listener("confusion", 0.0)
         tasks = [(r, leading, seed, number, replicates) for number, r in enumerate(leading)]
         confusion = np.array(list(spread(_confuse, tasks)))
@@ -151,9 +155,22 @@ def _confuse(task: tuple[Ranked, list[Ranked], int, int, int]) -> Array:
     return wins / replicates
 
 
-def _levels(apart: list[pd.DataFrame]) -> pd.DataFrame:
-    names = ("first", "declared")
-    parts = [frame.assign(model=name) for name, frame in zip(names, apart, strict=False)]
+def _apart(
+    ranked: list[Ranked], held: list[tuple[float, float, float]], declared: Simulation
+) -> dict[str, Ranked]:
+    """The models whose levels are looked at one by one."""
+    density = np.array([elpd for _, elpd, _ in held])
+    found = {"first": ranked[0]}
+    if np.isfinite(density).any():
+        found["held out"] = ranked[int(np.nanargmax(density))]
+    own = [r for r in ranked if r.simulation == declared]
+    if own:
+        found["declared"] = own[0]
+    return found
+
+
+def _levels(apart: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    parts = [frame.assign(model=name) for name, frame in apart.items()]
     return pd.concat(parts, ignore_index=True)[["model", *LEVEL_COLUMNS]]
 
 

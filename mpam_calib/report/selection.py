@@ -5,7 +5,8 @@ from __future__ import annotations
 import pandas as pd
 
 from mpam_calib.criticism.select import Selection
-from mpam_calib.report.page import Block, DataTable, Headline, Page, Section, Text, Verdict
+from mpam_calib.report.choices import choices_section
+from mpam_calib.report.page import Block, DataTable, Headline, Notice, Page, Section, Text, Verdict
 from mpam_calib.specimen.recording import Specimen
 
 SHOWN = 20
@@ -38,10 +39,8 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
         Headline(sentence),
         Verdict("Model selection", "good" if sure else "caution", reasons),
     ]
+    lead += [Notice(text) for text in _left_aside(specimen)]
     names = [short_name(models.iloc[i]) for i in range(len(found.confusion))]
-    confusion = pd.DataFrame(found.confusion, columns=[str(i + 1) for i in range(len(names))])
-    confusion.insert(0, "simulated from", [f"{i + 1}: {name}" for i, name in enumerate(names)])
-    formats = {str(i + 1): "{:.2f}" for i in range(len(names))}
     ranks = {
         "log_evidence": "{:.2f}", "log_evidence_se": "{:.2g}", "probability": "{:.3g}",
         "rmse_held_out_N": "{:.3g}",
@@ -59,19 +58,48 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
                 ),
             ],
         ),
+        choices_section(found.odds, found.levels),
         _sensitivity_section(found, names),
-        Section(
-            "Would data like these tell them apart?",
-            [
-                Text(
-                    f"Each row: {found.replicates} sets of loops simulated from that model with this "
-                    "specimen's design and noise; the columns say how often each model was then ranked first."
-                ),
-                DataTable(confusion, "Confusion of the leading models", formats),
-            ],
-        ),
     ]
+    if found.replicates:
+        sections.append(_confusion_section(found, names))
     return Page(specimen.name, "Model selection", lead, sections)
+
+
+def _left_aside(specimen: Specimen) -> list[str]:
+    """What the declaration says of the noise and the ranking does not use."""
+    found = []
+    if specimen.noise.robust:
+        found.append(
+            "Heavy tails of the noise ([noise] robust) are not part of this ranking: bursts are left out "
+            "where the noise is measured, but weigh on the evidence like any reading."
+        )
+    if specimen.noise.growth and specimen.loops is None:
+        found.append(
+            "Growth of the noise with the force ([noise] growth) is not part of this ranking: static "
+            "readings alone do not tell it before a model is fitted."
+        )
+    return found
+
+
+def _confusion_section(found: Selection, names: list[str]) -> Section:
+    """How often each leading model wins on data simulated from one of them."""
+    confusion = pd.DataFrame(found.confusion, columns=[str(i + 1) for i in range(len(names))])
+    confusion.insert(0, "simulated from", [f"{i + 1}: {name}" for i, name in enumerate(names)])
+    return Section(
+        "Would data like these tell them apart?",
+        [
+            Text(
+                f"Each row: {found.replicates} sets of loops simulated from that model with this "
+                "specimen's design and noise; the columns say how often each model was then ranked first."
+            ),
+            DataTable(
+                confusion,
+                "Confusion of the leading models",
+                {str(i + 1): "{:.2f}" for i in range(len(names))},
+            ),
+        ],
+    )
 
 
 def _sensitivity_section(found: Selection, names: list[str]) -> Section:

@@ -1,0 +1,72 @@
+"""How large the noise is, put right by what the most flexible models leave of the rows.
+
+Before any model is fitted, windows of consecutive readings tell the noise; short strokes leave short windows,
+and what they say of correlated noise at the length of a reduced row is good to some tens of percent. That
+matters: all evidences are as sharp as the noise is small. A model whose moduli are free at every level leaves
+of hundreds of rows little but noise. Its evidence as a function of a common scale on the noise's sd, with the
+remainder's sizes summed over, is combined with the windows' own uncertainty; the maximum is taken for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.criticism.fit import Fit, fit
+from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
+from mpam_calib.model.blueprint import Blueprint
+from mpam_calib.specimen.declaration import Simulation
+
+Array = NDArray[np.float64]
+
+LOG_SCALES = np.linspace(-0.8, 0.8, 17)
+"""Logarithms of the scales that are tried."""
+WINDOWS_SD = 0.35
+"""Standard deviation of the logarithm of the noise's sd as the windows give it."""
+MOST_ORDER = 5
+"""Highest order of the models that are asked."""
+
+
+def settle_noise(problem: Problem, space: Sequence[Simulation]) -> Problem:
+    """The problem with its noise scaled as the most probable flexible model of a space asks."""
+    flexible = [s for s in space if s.law == "free" and s.order <= MOST_ORDER] or list(space)
+    top = max(s.order for s in flexible)
+    blueprints = [problem.blueprint.model_copy(update={"simulation": s}) for s in flexible if s.order == top]
+    fits = [(b, found) for b in blueprints if (found := _fits(problem, b, {}))]
+    if not fits:
+        return problem
+    blueprint, found = max(fits, key=lambda item: _evidence(item[1].values()))
+    starts = {size: dict(zip(f.names, f.u.tolist(), strict=True)) for size, f in found.items()}
+    each = [
+        _evidence(_fits(problem.with_noise_scale(float(np.exp(s))), blueprint, starts).values())
+        for s in LOG_SCALES
+    ]
+    posterior = np.array(each) - 0.5 * (LOG_SCALES / WINDOWS_SD) ** 2
+    return problem.with_noise_scale(float(np.exp(_top(LOG_SCALES, posterior))))
+
+
+def _fits(problem: Problem, blueprint: Blueprint, starts: dict[int, dict[str, float]]) -> dict[int, Fit]:
+    found = {}
+    for size in range(len(SIZES)):
+        try:
+            found[size] = fit(problem, frozenset(), size, starts.get(size), blueprint)
+        except np.linalg.LinAlgError:
+            continue
+    return found
+
+
+def _evidence(fits: Iterable[Fit]) -> float:
+    terms = [f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits]
+    return float(np.logaddexp.reduce(terms)) if terms else -np.inf
+
+
+def _top(x: Array, y: Array) -> float:
+    """Where a curve is highest: the vertex of the parabola through the best point and its neighbours."""
+    i = int(np.clip(np.argmax(y), 1, len(x) - 2))
+    bend = y[i - 1] - 2.0 * y[i] + y[i + 1]
+    if not bend < 0.0:
+        return float(x[int(np.argmax(y))])
+    return float(np.clip(x[i] + 0.5 * (y[i - 1] - y[i + 1]) / bend * (x[1] - x[0]), x[0], x[-1]))
