@@ -278,6 +278,6 @@ def _gain(found: Search, effects: Set, partner: str, size: int) -> float:
     if single is None or nothing is None:
         return -np.inf
     signature = found.problem.white(single.force - nothing.force, size)
-    residual = found.problem.white(found.problem.force - base.force - base.doubt, size)
+    residual = found.problem.white(found.problem.force - base.force, size)
     power = float(signature @ signature)
     return 0.5 * float(signature @ residual) ** 2 / power if power > 1e-12 else 0.0

@@ -1,5 +1,6 @@
 """Score ``diagnose`` on a set of hidden-effect cases: in tests/, ``python -m criticism.score locked``.
 
+``locked-halved`` has the same cases with every effect at half its size.
 Every case is one line of ``reports/score_<set>.csv``; a second run goes on where the first stopped. The
 rates that it prints are those of the issue, each with its binomial (Wilson) interval.
 """
@@ -14,7 +15,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 from rig import case as rig_case
 from rig import margins, recipes, sets
 from rig.effects import form as rig_form
@@ -31,6 +34,8 @@ from mpam_calib.units import si_factor
 
 FIELDS = ["name", "group", "truth", "outside", "word", "named", "listed", "probability", "inside", "sized"]
 LISTED = 5
+HALVED = "-halved"
+"""What the name of a set ends in whose effects are halved."""
 NATS = 10.0
 """Nats by which the oracle must prefer the truth for a case to count as separable."""
 
@@ -70,9 +75,11 @@ def _inside(search: Search, effects: frozenset[str], one: rig_case.Case) -> tupl
     return hits, of
 
 
-def score_case(recipe: recipes.Recipe) -> Scored:
+def score_case(recipe: recipes.Recipe, halved: bool = False) -> Scored:
     """Record one case, read it as a specimen folder, search and judge."""
     one = recipes.build_case(recipe)
+    if halved:
+        one = recipes.halved(one)
     with tempfile.TemporaryDirectory() as folder:
         rig_case.write_case(one, Path(folder) / "specimen", Path(folder) / "truth.json")
         try:
@@ -139,8 +146,10 @@ def wilson(hits: int, of: int) -> tuple[float, float]:
 
 def rates(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
     """The issue's rates as (what, hits, of)."""
-    table = margins.read_margins(which)
-    separable = {name for name, row in table.items() if row["margin"] and float(row["margin"]) >= NATS}
+    table = margins.read_margins(which.removesuffix(HALVED))
+    column = "margin_halved" if which.endswith(HALVED) else "margin"
+    separable = {name for name, row in table.items() if row[column] and float(row[column]) >= NATS}
+    beaten = {name for name, row in table.items() if row[column] and float(row[column]) <= 0.0}
     clean = [s for s in scored if not s.outside]
     sep = [s for s in clean if s.truth and s.name in separable]
     other = [s for s in clean if s.truth and s.name not in separable]
@@ -151,6 +160,12 @@ def rates(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
         ("separable: truth ranked first", sum(s.listed[:1] == (s.truth,) for s in sep), len(sep)),
         ("separable: wrong set named", sum(s.word == "named" and s.named != s.truth for s in sep), len(sep)),
         ("not separable: truth among the listed", sum(s.truth in s.listed for s in other), len(other)),
+        (
+            "not separable: another set beats it for the oracle",
+            sum(s.name in beaten for s in other),
+            len(other),
+        ),
+        ("not separable: adequate", sum(s.word == "adequate" for s in other), len(other)),
         (
             "not separable: wrong set named",
             sum(s.word == "named" and s.named != s.truth for s in other),
@@ -177,29 +192,54 @@ def calibration(scored: list[Scored]) -> list[tuple[float, float, int, int]]:
     return table
 
 
+def draw_calibration(scored: list[Scored], path: Path) -> None:
+    """Stated probabilities of the leading set against actual frequencies, with 95 % intervals."""
+    mpl.rcParams["svg.hashsalt"] = "calibration"
+    figure = Figure(figsize=(4.2, 3.6), layout="constrained")
+    axes = figure.subplots()
+    axes.plot([0, 1], [0, 1], color="0.7", linewidth=1)
+    clean = [s for s in scored if not s.outside and s.listed]
+    for low, high, hits, of in calibration(scored):
+        if of:
+            stated = float(np.mean([s.probability for s in clean if low < s.probability <= high]))
+            bottom, top = wilson(hits, of)
+            axes.plot([stated, stated], [bottom, top], color="tab:blue")
+            axes.plot(stated, hits / of, "o", color="tab:blue")
+            axes.annotate(
+                f"{hits}/{of}", (stated, bottom), textcoords="offset points", xytext=(-12, -11), fontsize=8
+            )
+    axes.set(xlabel="stated probability of the leading set", ylabel="share in which it is the truth")
+    axes.set(xlim=(-0.02, 1.04), ylim=(-0.08, 1.04))
+    figure.savefig(path, metadata={"Date": None})
+
+
 def main(which: str, shard: int = 0, shards: int = 1, workers: int = 2) -> None:
     """Score what is not scored yet, then print the rates of all that is."""
     path = Path(__file__).parents[2] / "reports" / f"score_{which}.csv"
     path.parent.mkdir(exist_ok=True)
     done = list(csv.DictReader(path.open())) if path.exists() else []
     names = {row["name"] for row in done}
-    todo = [r for r in sets.recipes(which)[shard::shards] if r.name not in names]
+    halved = which.endswith(HALVED)
+    todo = [r for r in sets.recipes(which.removesuffix(HALVED))[shard::shards] if r.name not in names]
+    if halved:
+        todo = [r for r in todo if r.effects and not r.outside]
     todo.sort(key=lambda r: r.seed)  # so that what an interrupted run has done is a fair sample
     with path.open("a", newline="") as file, ProcessPoolExecutor(workers) as pool:
         writer = csv.writer(file, lineterminator="\n")
         if not done:
             writer.writerow(FIELDS)
-        for scored in pool.map(score_case, todo):
+        for scored in pool.map(score_case, todo, [halved] * len(todo)):
             writer.writerow(_row(scored))
             file.flush()
     everything = [_parsed(row) for row in csv.DictReader(path.open())]
     for what, hits, of in rates(everything, which):
         low, high = wilson(hits, of)
         share = hits / of if of else float("nan")
-        print(f"{what:<40} {hits:>4} of {of:<4} {share:6.1%}  ({low:.1%} to {high:.1%})")
+        print(f"{what:<52} {hits:>4} of {of:<4} {share:6.1%}  ({low:.1%} to {high:.1%})")
     print("stated probability of the leading set, and how often it is the truth")
     for low, high, hits, of in calibration(everything):
         print(f"  {low:.2f} to {high:.2f}: {hits:>4} of {of}")
+    draw_calibration(everything, path.with_suffix(".svg"))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,115 @@
+"""What naming the causes gains, beside an oracle: in tests/, ``python -m criticism.gains locked 30``.
+
+For the first cases (by seed) of a set whose verdict reports causes: root mean square error of the extended
+model on levels or cycles held out (search, verdict and fit repeated in every fold), beside that of the rig's
+own model with the true forms refitted to the same folds; and the coverage of the 90 % bands. Both errors are
+against the same reduced rows. Every case is one line of ``reports/gains_<set>.csv``; a second run goes on.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from rig import case as rig_case
+from rig import recipes, sets
+from rig.oracle import Oracle
+
+from mpam_calib.criticism.candidates import HISTORY, candidates
+from mpam_calib.criticism.gain import FOLDS, measure_gain
+from mpam_calib.criticism.problem import Problem, build_problem
+from mpam_calib.criticism.search import search
+from mpam_calib.criticism.verdict import judge
+from mpam_calib.errors import InputError
+from mpam_calib.model.blueprint import Options, draw_blueprint
+from mpam_calib.specimen import read
+from mpam_calib.specimen.recording import Specimen
+
+FIELDS = [
+    "name", "word", "causes", "held_out", "rmse_before_N", "rmse_after_N", "rmse_oracle_N",
+    "coverage90_before", "coverage90_after", "folds_same_set", "folds",
+]  # fmt: skip
+
+
+def problem_of(specimen: Specimen) -> Problem:
+    """The reduced rows of a specimen."""
+    return build_problem(specimen, draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
+
+
+def oracle_rmse(recording: rig_case.Recording, specimen: Specimen, problem: Problem, by_cycle: bool) -> float:
+    """RMSE (N) of the true forms, fitted without each fold, on the fold's reduced rows."""
+    loops = specimen.loops
+    assert loops is not None
+    raw, reduced = (loops.cycle, problem.cycle) if by_cycle else (loops.level, problem.level)
+    labels = np.unique(reduced)
+    known = {h.id: h.size for h in recording.case.hidden}
+    squares = []
+    for i in range(min(FOLDS, len(labels))):
+        held = np.isin(raw, labels[i::FOLDS])
+        fitted = Oracle(recording, ~held).fit(recording.case.ids, known)
+        # The same reduction of the oracle's force as of the readings.
+        force = problem_of(replace(specimen, loops=replace(loops, force_N=fitted.force))).force
+        squares.append((force - problem.force)[np.isin(reduced, labels[i::FOLDS])] ** 2)
+    return float(np.sqrt(np.mean(np.concatenate(squares))))
+
+
+def measure(recipe: recipes.Recipe) -> list[str] | None:
+    """One line of the table; None where the case is refused, names nothing or loses readings to a floor."""
+    one = recipes.build_case(recipe)
+    with tempfile.TemporaryDirectory() as folder:
+        rig_case.write_case(one, Path(folder) / "specimen", Path(folder) / "truth.json")
+        try:
+            specimen = read(Path(folder) / "specimen")
+        except InputError:
+            return None
+    if specimen.loops is None or specimen.loops.censored.any():
+        return None
+    problem = problem_of(specimen)
+    tested = candidates(problem).tested
+    verdict = judge(search(problem, tested))
+    gain = measure_gain(problem, tested, verdict.standing) if verdict.standing else None
+    if gain is None:
+        return None
+    by_cycle = gain.held_out == "cycle"
+    assert by_cycle == (bool(verdict.standing & set(HISTORY)) and len(np.unique(problem.cycle)) > 2)
+    oracle = oracle_rmse(rig_case.record(one), specimen, problem, by_cycle)
+    return [
+        recipe.name, verdict.word, "+".join(sorted(verdict.standing)), gain.held_out,
+        *(f"{x:.4f}" for x in (gain.rmse_before, gain.rmse_after, oracle)),
+        f"{gain.coverage90_before:.3f}", f"{gain.coverage90_after:.3f}",
+        str(gain.folds_same_set), str(gain.folds),
+    ]  # fmt: skip
+
+
+def main(which: str, count: int, workers: int = 2) -> None:
+    """Measure the first ``count`` cases with hidden effects, then print medians over all lines there are."""
+    path = Path(__file__).parents[2] / "reports" / f"gains_{which}.csv"
+    path.parent.mkdir(exist_ok=True)
+    done = list(csv.DictReader(path.open())) if path.exists() else []
+    names = {row["name"] for row in done}
+    chosen = [r for r in sets.recipes(which) if r.group == "separable" and not r.outside]
+    chosen = sorted(chosen, key=lambda r: r.seed)[:count]
+    with path.open("a", newline="") as file, ProcessPoolExecutor(workers) as pool:
+        writer = csv.writer(file, lineterminator="\n")
+        if not done:
+            writer.writerow(FIELDS)
+        for line in pool.map(measure, [r for r in chosen if r.name not in names]):
+            if line is not None:
+                writer.writerow(line)
+                file.flush()
+    rows = list(csv.DictReader(path.open()))
+    ratio = np.array([float(r["rmse_after_N"]) / float(r["rmse_oracle_N"]) for r in rows])
+    for label in ("before", "after"):
+        cover = np.array([float(r[f"coverage90_{label}"]) for r in rows])
+        print(f"coverage of 90 % bands {label}: median {np.median(cover):.3f}, mean {cover.mean():.3f}")
+    low, middle, high = np.quantile(ratio, [0.25, 0.5, 0.75])
+    print(f"{len(rows)} cases; RMSE after over the oracle's: median {middle:.3f} ({low:.3f} to {high:.3f})")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], *map(int, sys.argv[2:]))
