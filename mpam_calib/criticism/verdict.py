@@ -19,7 +19,7 @@ SURE, LEAD = 0.95, 5.0
 LISTED = 5
 NOISE_SIZE = 0.5
 """A remainder whose root mean square is below this share of a reading's noise is at its level."""
-REPEAT_SIZE = 0.35
+REPEAT_SIZE = 0.2
 """The same for fine structure that repeats, which itself passes for noise in a single stroke."""
 
 
