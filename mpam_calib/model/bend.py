@@ -30,6 +30,8 @@ LOOSE: Final = 0.5
 """... and for the others, whose laws are the least known: how things fade with time, cycles and travel."""
 MOST: Final = 1.5
 """Largest logarithm of the factor, whatever the coefficients."""
+EARLY: Final = 20.0
+"""Duration of the test over that of the part in which something that settles does most of it."""
 TURN_SHARE: Final = 0.03
 """Share of the stroke after which a turn is half over, for the driver ``travel``."""
 
@@ -54,6 +56,9 @@ DRIVERS: Final[Mapping[str, Callable[[State, Setting], Array]]] = {
     "pressure": _pressure,
     "force": lambda state, setting: np.abs(state.guide) / setting.force_scale - 1.0,
     "time": lambda state, setting: 2.0 * state.readings.time / max(setting.duration, 1.0) - 1.0,
+    "settling": lambda state, setting: (
+        2.0 * np.log1p(EARLY * state.readings.time / max(setting.duration, 1.0)) / np.log1p(EARLY) - 1.0
+    ),
     "level_time": lambda state, setting: (
         2.0 * np.log1p(state.readings.time_at_level) / np.log1p(max(setting.level_time, 1.0)) - 1.0
     ),

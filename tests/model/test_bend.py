@@ -73,7 +73,7 @@ def test_a_straight_bend_is_the_plain_effect(identifier: str) -> None:
 
 
 def test_the_size_follows_the_driver() -> None:
-    """An offset that grows along the stroke and fades in time: every row has its own."""
+    """An offset that grows along the stroke and settles in time: every row has its own."""
     form = "length_offset:bent"
     setting = setting_for(form)
     readings = rows(setting)
@@ -85,7 +85,7 @@ def test_the_size_follows_the_driver() -> None:
     }
     bent = Chain(setting, None, False).force(values, np.zeros((1, 0)), readings)[0]
     along = 2.0 * readings.displacement / setting.stroke - 1.0
-    in_time = 2.0 * readings.time / setting.duration - 1.0
+    in_time = 2.0 * np.log(1.0 + 20.0 * readings.time / setting.duration) / np.log(21.0) - 1.0
     local = 1e-3 * np.exp(0.4 * along - 0.3 * in_time)
     plain = replace(setting, simulation=setting.simulation.model_copy(update={"effects": ()}))
     shifted = replace(readings, displacement=readings.displacement + local)
