@@ -22,12 +22,13 @@ from mpam_calib.posterior.mode import Mode
 
 Array = NDArray[np.float64]
 
-NEGLIGIBLE, NEGLIGIBLE_ELSEWHERE = 5.0, 10.0
+NEGLIGIBLE, NEGLIGIBLE_ELSEWHERE = 5.0, 8.0
 """Nats below the best size at which Laplace's figure will do; and at which other priors are not tried."""
 SETTLES = 7
 """Parameters up to which the rule of quadrature settles; in more it is left at Laplace's figure."""
+AS_DECLARED = (1.0, 1.0)
 WIDTHS = {
-    "as declared": (1.0, 1.0),
+    "as declared": AS_DECLARED,
     "moduli halved": (0.5, 1.0),
     "moduli doubled": (2.0, 1.0),
     "others halved": (1.0, 0.5),
@@ -45,7 +46,7 @@ class Weighed:
 
 
 def log_evidence_by_quadrature(
-    problem: Problem, blueprint: Blueprint, fits: list[Fit], widths: tuple[float, float] = (1.0, 1.0)
+    problem: Problem, blueprint: Blueprint, fits: list[Fit], widths: tuple[float, float] = AS_DECLARED
 ) -> float:
     """Log evidence, summed over the remainder's sizes; ``widths`` as in WIDTHS."""
     return float(np.logaddexp.reduce(list(_sizes(problem, blueprint, fits, widths)[0].values())))
@@ -53,7 +54,7 @@ def log_evidence_by_quadrature(
 
 def weigh(problem: Problem, blueprint: Blueprint, fits: list[Fit], seed: int) -> Weighed:
     """Quadrature and, for the sizes that matter, a bridge; an infinite error where none could be built."""
-    terms, inner = _sizes(problem, blueprint, fits, (1.0, 1.0))
+    terms, inner = _sizes(problem, blueprint, fits, AS_DECLARED)
     quadrature = float(np.logaddexp.reduce(list(terms.values())))
     if not inner:
         return Weighed(quadrature, Bridge(quadrature, float("inf")))
@@ -72,7 +73,7 @@ def _sizes(
     """Terms of the sum by size, and the densities behind those that were integrated."""
     terms = {f.size: f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits}
     best = max(terms.values())
-    declared = widths == WIDTHS["as declared"]
+    declared = widths == AS_DECLARED
     # Under other priors the fits' own evidences say only roughly which sizes matter.
     within = NEGLIGIBLE if declared else NEGLIGIBLE_ELSEWHERE
     modes: dict[int, tuple[Hypothesis, Mode]] = {}

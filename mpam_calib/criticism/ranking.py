@@ -10,7 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import log, pi
+from math import log, pi, sqrt
 
 import numpy as np
 from scipy import linalg
@@ -28,6 +28,8 @@ NEAR = 20.0
 """Nats below the best within which Laplace's evidence is replaced by quadrature."""
 SILENT = 300.0
 """Nats below a larger remainder at which still smaller ones are not tried."""
+CHANCE = 3.0
+"""Standard deviations of chi-squared beyond which a better fit is no chance."""
 SHARED, EACH = "exponential", "exponential_each"
 STARTS: dict[str, tuple[dict[str, float], ...]] = {
     SHARED: ({"d": 1.0, "gap": -1.0}, {"d": -1.0, "gap": -1.0})
@@ -87,7 +89,7 @@ def rank_spread(
         return []
     top = max(r.log_evidence for r in ranked)
     tasks = [
-        (group, _hopeful(found, top) or any(always(s) for s in group.values()))
+        (group, found.get("free"), _hopeful(found, top) or any(always(s) for s in group.values()))
         for group, found in zip(groups, plain, strict=True)
     ]
     for number, rated in enumerate(spread(_fit_rates, tasks)):
@@ -201,15 +203,23 @@ def _fit_plain(group: dict[str, Simulation]) -> dict[str, Ranked | None]:
     return {law: fitted(problem, s) for law, s in group.items() if law not in (SHARED, EACH)}
 
 
-def _fit_rates(task: tuple[dict[str, Simulation], bool]) -> list[Ranked]:
-    """The laws with rates of a group, searched thoroughly or not."""
-    group, thorough = task
+def _fit_rates(task: tuple[dict[str, Simulation], Ranked | None, bool]) -> list[Ranked]:
+    """The laws with rates of a group, searched thoroughly or not; ``free`` is the group's free law."""
+    group, free, thorough = task
     problem = held_problem()
     found: dict[str, Ranked | None] = {}
     for law in (SHARED, EACH):
         if law in group:
-            found[law] = fitted(problem, group[law], found.get(SHARED), thorough)
+            shared = found.get(SHARED)
+            search = thorough and (free is None or shared is None or not _says_all(shared, free))
+            found[law] = fitted(problem, group[law], shared, search)
     return [r for r in found.values() if r is not None]
+
+
+def _says_all(law: Ranked, free: Ranked) -> bool:
+    """Whether moduli free at each level fit no better than their number makes them: no other law can then."""
+    extra = max(len(free.best.eta) - len(law.best.eta) - len(law.best.u) + len(free.best.u), 1)
+    return 2.0 * (free.ceiling - law.ceiling) < extra + CHANCE * sqrt(2.0 * extra)
 
 
 def _hopeful(plain: dict[str, Ranked | None], top: float) -> bool:

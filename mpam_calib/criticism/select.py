@@ -15,6 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mpam_calib.criticism.evidence import (
+    AS_DECLARED,
     WIDTHS,
     Weighed,
     log_evidence_by_quadrature,
@@ -95,11 +96,14 @@ def select(
         )
         listener("bridging", 0.0)
         weighed = list(spread(_weigh, [(r, seed) for r in ranked[:CONFUSED]]))
+        known = {r.simulation.model_dump_json(): w.quadrature for r, w in zip(ranked, weighed, strict=False)}
         ranked[:CONFUSED] = [_bridged(r, w) for r, w in zip(ranked, weighed, strict=False)]
         ranked.sort(key=lambda r: -r.log_evidence)
         leading = ranked[:CONFUSED]
         listener("other priors", 0.0)
-        widened = np.array(list(spread(_widen, leading)))
+        widened = np.array(
+            list(spread(_widen, [(r, known.get(r.simulation.model_dump_json())) for r in leading]))
+        )
         listener("holding out", 0.0)
         held = list(spread(hold_out, ranked[:HELD_OUT]))
         chosen = _apart(ranked, held, declared)
@@ -132,11 +136,17 @@ def _bridged(ranked: Ranked, weighed: Weighed) -> Ranked:
     return replace(ranked, log_evidence=weighed.bridge.value, error=weighed.bridge.error)
 
 
-def _widen(ranked: Ranked) -> list[float]:
-    """Log evidence for each of WIDTHS."""
+def _widen(task: tuple[Ranked, float | None]) -> list[float]:
+    """Log evidence for each of WIDTHS; the first may be known already."""
+    ranked, known = task
     problem = held_problem()
     blueprint = blueprint_of(problem, ranked.simulation)
-    return [log_evidence_by_quadrature(problem, blueprint, ranked.fits, w) for w in WIDTHS.values()]
+    return [
+        known
+        if known is not None and widths == AS_DECLARED
+        else log_evidence_by_quadrature(problem, blueprint, ranked.fits, widths)
+        for widths in WIDTHS.values()
+    ]
 
 
 def _confuse(task: tuple[Ranked, list[Ranked], int, int, int]) -> Array:
