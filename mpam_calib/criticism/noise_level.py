@@ -25,6 +25,8 @@ WINDOW, DEGREE = 32, 3
 """Windows of at most so many rows, detrended by a polynomial of this degree ..."""
 SHORT_DEGREE = 5
 """... or of this one, where a stroke is so short that it is one window."""
+COMES_BACK = 0.6
+"""Share of the scatter inside strokes below which that between repeated strokes is believed."""
 USUAL = 4.0
 """Multiple of the typical power above which a window holds more than noise."""
 FEWEST_PAIRS = 6
@@ -47,10 +49,25 @@ class NoiseLevel:
 
 
 def noise_level(loops: Loops, model: Model) -> NoiseLevel | None:
-    """Posterior mode of the noise under the model's priors; None where the strokes are too short to tell."""
-    found = noise_windows(loops)
-    if found is None:
+    """Posterior mode of the noise under the model's priors; None where the strokes are too short to tell.
+
+    A ripple of the drive is as fast as noise, but comes back: where strokes that repeat each other differ
+    by much less than each scatters, their differences are the noise.
+    """
+    windows = noise_windows(loops)
+    if windows is None:
         return None
+    found = _mode(windows, loops.averaged, model)
+    pairs = _between_cycles(loops)
+    if pairs is not None:
+        between = _mode(pairs, loops.averaged, model)
+        if between.total < COMES_BACK * found.total:
+            return between
+    return found
+
+
+def _mode(found: Windows, averaged: int, model: Model) -> NoiseLevel:
+    """Posterior mode given what windows see."""
     names = [name for name in (WHITE, CORRELATED, TIME, GROWTH) if name in model.names]
     priors = {p.name: p.prior for p in model.parameters}
     scale = 1.0 if model.setting is None else model.setting.force_scale
@@ -67,12 +84,12 @@ def noise_level(loops: Loops, model: Model) -> NoiseLevel | None:
             return 1e12
         *sizes, growth = values(u)
         if GROWTH in names:
-            covariance = fast_noise_covariance(scatter, loops.averaged, *sizes)
+            covariance = fast_noise_covariance(scatter, averaged, *sizes)
             likelihood = chunk_log_likelihood(
                 covariance, found.chunks, grown(growth[:, None], found.force, scale)
             )
         else:
-            likelihood = fast_noise_log_likelihood(scatter, loops.averaged, *sizes)
+            likelihood = fast_noise_log_likelihood(scatter, averaged, *sizes)
         return float(0.5 * u @ u - likelihood[0])
 
     # Left to itself the search starts with steps of 0.00025 at zero, and ends there.
@@ -118,11 +135,10 @@ class Windows(NamedTuple):
 
 def noise_windows(loops: Loops) -> Windows | None:
     """Detrended windows of consecutive rows inside strokes, away from their ends."""
-    first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
-    length = np.diff(np.append(first, len(loops.stroke)))
+    first, length = _strokes(loops)
     typical = int(np.median(length))
     size, degree, margin = min(WINDOW, typical // 4), DEGREE, max(min(WINDOW, typical // 4) // 4, 2)
-    if size < DEGREE + 4 and (found := _between_cycles(loops, first, length)) is not None:
+    if size < DEGREE + 4 and (found := _between_cycles(loops)) is not None:
         return found
     if size < DEGREE + 4:
         # The whole stroke, with a stiffer curve taken out: differences of far rows see the curve itself.
@@ -145,11 +161,18 @@ def noise_windows(loops: Loops) -> Windows | None:
     return _detrended(loops.force_N[index], loops.force_N[index].mean(axis=1), degree, dt)
 
 
-def _between_cycles(loops: Loops, first: Ints, length: Ints) -> Windows | None:
+def _strokes(loops: Loops) -> tuple[Ints, Ints]:
+    """First row and number of rows of each stroke."""
+    first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
+    return first, np.diff(np.append(first, len(loops.stroke)))
+
+
+def _between_cycles(loops: Loops) -> Windows | None:
     """The same from differences of strokes that repeat each other: short strokes leave no other way.
 
     What the muscle does, and whatever is wrong with it, comes back in the next cycle; noise does not.
     """
+    first, length = _strokes(loops)
     groups: dict[tuple[int, int, int], list[int]] = {}
     for stroke, (f, n) in enumerate(zip(first, length, strict=True)):
         if not loops.censored[f : f + n].any():
