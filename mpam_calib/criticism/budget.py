@@ -67,6 +67,6 @@ def remainder_rms(problem: Problem, fitted: Fit) -> float:
     if fitted.size == 0:
         return 0.0
     size = SIZES[fitted.size] * problem.force_scale
-    residual = problem.force - fitted.force
+    residual = problem.force - fitted.force - fitted.doubt
     smooth = size**2 * problem.kernel @ linalg.solve(problem.covariance(SIZES[fitted.size]), residual)
     return float(np.sqrt(np.mean(smooth**2)))

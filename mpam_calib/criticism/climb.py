@@ -38,9 +38,9 @@ COARSE = 0.01
 
 @dataclass(frozen=True)
 class Place:
-    """The force linearised at coordinates ``u`` (d,), with the linear ones ``eta`` (p,) at their optimum.
+    """The force linearised at coordinates ``u`` (d,), with the linear ones ``eta`` (q,) at their optimum.
 
-    ``residual`` (n,) and ``J`` (n, d + p) are whitened, ``force`` (n,) is the model's in newtons,
+    ``residual`` (n,) and ``J`` (n, d + q) are whitened, ``force`` (n,) is the model's in newtons,
     ``guide`` (m,) the same at the lean readings; ``objective`` is the log density up to a constant.
     """
 
@@ -55,11 +55,12 @@ class Place:
 
 @dataclass
 class Climb:
-    """A climb beside a remainder of SIZES[size]."""
+    """A climb beside a remainder of SIZES[size]; ``extra`` (n, r), N, are further linear columns."""
 
     problem: Problem
     chain: Chain
     size: int
+    extra: Array
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -70,6 +71,11 @@ class Climb:
     def _offsets(self) -> Array:
         d = len(self.names)
         return np.concatenate([np.zeros((1, d)), STEP * np.eye(d)])
+
+    @cached_property
+    def _extra(self) -> Array:
+        """The further columns, whitened."""
+        return self.problem.white(self.extra, self.size)
 
     def values(self, u: Array) -> dict[str, Array]:
         """Values (B, 1) for coordinates u (B, d)."""
@@ -86,7 +92,7 @@ class Climb:
 
     def look(self, u: Array, guide: Array, eta: Array) -> Place:
         """Linearise at u; ``eta`` (p,) serves where the force depends on itself."""
-        problem = self.problem
+        problem, p = self.problem, self.chain.linear_size
         _, first, second = problem.lean
         if self.chain.uses_force:
             nudge = NUDGE * problem.force_scale
@@ -105,20 +111,20 @@ class Climb:
         fixed = 0.5 * (fixed[:, first] + fixed[:, second]) + problem.bow
         columns = 0.5 * (columns[:, first] + columns[:, second])
         white = problem.white(np.column_stack([problem.force - fixed[0], columns[0]]), self.size)
-        X = white[:, 1:]
+        X = np.concatenate([white[:, 1:], self._extra], axis=1)
         # Given the sizes, the linear coordinates' optimum is exact.
         gram = X.T @ X + np.eye(X.shape[1])
         best = np.asarray(linalg.solve(gram, X.T @ white[:, 0], assume_a="pos")) if len(gram) else np.zeros(0)
         residual = white[:, 0] - X @ best
-        moved = (fixed[1:] - fixed[0]) + (columns[1:] - columns[0]) @ best
+        moved = (fixed[1:] - fixed[0]) + (columns[1:] - columns[0]) @ best[:p]
         objective = -0.5 * float(residual @ residual + u @ u + best @ best)
         return Place(
             u=u,
             eta=best,
             residual=residual,
             J=np.concatenate([problem.white(moved.T / STEP, self.size), X], axis=1),
-            force=fixed[0] + columns[0] @ best,
-            guide=whole + whole_columns @ best,
+            force=fixed[0] + columns[0] @ best[:p],
+            guide=whole + whole_columns @ best[:p],
             objective=objective if np.isfinite(objective) else -np.inf,
         )
 
@@ -148,7 +154,7 @@ class Climb:
                 if damping > 1e4:
                     break
             # What depends on the force is fed with the model's own.
-            guide, eta = best.guide, best.eta
+            guide, eta = best.guide, best.eta[: self.chain.linear_size]
             J, misfit = best.J, float(best.residual @ best.residual)
             hessian = J.T @ J + np.eye(J.shape[1])
             gradient = J.T @ best.residual - np.concatenate([best.u, best.eta])

@@ -1,7 +1,8 @@
 """One hypothesis, refitted exactly, and its evidence.
 
 Sizes are sampler coordinates (standard normal priors), moduli the block's own; the evidence is Laplace's
-with the Gauss-Newton Hessian.
+with the Gauss-Newton Hessian. Effects may bring a doubt about their forms
+(:mod:`mpam_calib.criticism.doubt`).
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from mpam_calib.criticism.climb import Climb
+from mpam_calib.criticism.doubt import doubts
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.model import build_model
+from mpam_calib.model.readings import Readings
 
 Array = NDArray[np.float64]
 
@@ -26,8 +29,9 @@ Array = NDArray[np.float64]
 class Fit:
     """A refitted hypothesis: its effects, the remainder's size, coordinates and how good it is.
 
-    ``u`` (d,) and ``eta`` (p,) at the mode with covariance (d + p, d + p); ``force`` (n,) the model's, N;
-    ``log_evidence`` in nats, ``chi2`` the whitened sum of squares.
+    ``u`` (d,), ``eta`` (p,) and the doubt's ``zeta`` (r,) at the mode with covariance (d + p + r, d + p + r);
+    ``force`` (n,) the model's and ``doubt`` (n,) what the doubt adds, N; ``log_evidence`` in nats, ``chi2``
+    the whitened sum of squares.
     """
 
     effects: frozenset[str]
@@ -35,8 +39,10 @@ class Fit:
     names: tuple[str, ...]
     u: Array
     eta: Array
+    zeta: Array
     covariance: Array
     force: Array
+    doubt: Array
     log_evidence: float
     chi2: float
 
@@ -56,23 +62,39 @@ def chain_for(key: str, effects: frozenset[str]) -> Chain:
     return chain
 
 
+def doubt_columns(
+    key: str, effects: frozenset[str], values: dict[str, Array], eta: Array, readings: Readings, guide: Array
+) -> Array:
+    """Columns (m, r), N, of the doubt about the effects' forms: see :func:`doubt.doubts`."""
+    without = {e: chain_for(key, effects - {e}) for e in effects}
+    return doubts(chain_for(key, effects), without, values, eta, readings, guide)
+
+
 def fit(
     problem: Problem,
     effects: frozenset[str],
     size: int,
     start: dict[str, float] | None = None,
     blueprint: Blueprint | None = None,
+    doubted: bool = False,
 ) -> Fit:
     """Refit the simulation with these effects against a remainder of SIZES[size].
 
     ``start`` gives coordinates by parameter name to start from (0 otherwise); ``blueprint`` another
-    declared simulation than the problem's.
+    declared simulation than the problem's. ``doubted`` effects bring a doubt about their forms.
     """
     key = (blueprint or problem.blueprint).model_dump_json()
     chain, n = chain_for(key, effects), len(problem)
-    climb = Climb(problem, chain, size)
+    climb = Climb(problem, chain, size, np.empty((n, 0)))
     u = np.array([(start or {}).get(name, 0.0) for name in climb.names], dtype=np.float64)
     place = climb.climb(u, climb.guide(), np.zeros(chain.linear_size))
+    if effects and doubted:
+        # The doubt is in proportion to the sizes found so far; with it they settle once more.
+        readings, first, second = problem.lean
+        columns = doubt_columns(key, effects, climb.values(place.u[None]), place.eta, readings, place.guide)
+        climb = Climb(problem, chain, size, 0.5 * (columns[first] + columns[second]))
+        place = climb.climb(place.u, place.guide, place.eta)
+    eta, zeta = np.split(place.eta, [chain.linear_size])
     hessian = place.J.T @ place.J + np.eye(place.J.shape[1])
     factor = linalg.cho_factor(hessian, lower=True)
     log_det = 2.0 * float(np.sum(np.log(np.diagonal(factor[0]))))
@@ -82,9 +104,11 @@ def fit(
         size=size,
         names=climb.names,
         u=place.u,
-        eta=place.eta,
+        eta=eta,
+        zeta=zeta,
         covariance=np.asarray(linalg.cho_solve(factor, np.eye(len(hessian)))),
         force=place.force,
+        doubt=climb.extra @ zeta,
         log_evidence=float(evidence),
         chi2=float(place.residual @ place.residual),
     )

@@ -15,7 +15,7 @@ from scipy import linalg
 
 from mpam_calib.criticism.candidates import HISTORY
 from mpam_calib.criticism.climb import STEP
-from mpam_calib.criticism.fit import Fit, chain_for
+from mpam_calib.criticism.fit import Fit, chain_for, doubt_columns
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.search import Search, Set, search
 from mpam_calib.criticism.spread import held_problem, spread_over
@@ -149,8 +149,9 @@ def predict_rows(
 
 
 def linearise(problem: Problem, fitted: Fit, blueprint: Blueprint | None = None) -> tuple[Array, Array]:
-    """Force (n,) and its Jacobian (n, d + p) at a fit, on all rows of a problem."""
-    chain = chain_for((blueprint or problem.blueprint).model_dump_json(), fitted.effects)
+    """Force (n,), the doubt's part in it, and Jacobian (n, d + p + r) at a fit, on all rows of a problem."""
+    key = (blueprint or problem.blueprint).model_dump_json()
+    chain = chain_for(key, fitted.effects)
     n, d = len(problem), len(fitted.u)
     points = fitted.u + np.concatenate([np.zeros((1, d)), STEP * np.eye(d)])
     values = {q.name: q.prior.from_normal(points[:, i : i + 1]) for i, q in enumerate(chain.parameters)}
@@ -165,4 +166,9 @@ def linearise(problem: Problem, fitted: Fit, blueprint: Blueprint | None = None)
         chain.terms(one, problem.readings, guide).columns, (1, 2 * n, chain.linear_size)
     )[0]
     X = 0.5 * (columns[:n] + columns[n:])
-    return mean[0], np.concatenate([(mean[1:] - mean[0]).T / STEP, X], axis=1)
+    J = np.concatenate([(mean[1:] - mean[0]).T / STEP, X], axis=1)
+    if not len(fitted.zeta):
+        return mean[0], J
+    columns = doubt_columns(key, fitted.effects, one, fitted.eta, problem.readings, guide)
+    D = 0.5 * (columns[:n] + columns[n:])
+    return mean[0] + D @ fitted.zeta, np.concatenate([J, D], axis=1)

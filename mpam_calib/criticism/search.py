@@ -1,5 +1,6 @@
 """Searching sets of effects: linearised scores order the search, exact refits decide it.
 
+In the end the leading sets are refitted with a doubt about their forms (:mod:`mpam_calib.criticism.doubt`).
 A set's posterior sums its evidence over the remainder's sizes. A priori a further cause is as likely
 as the average catalogue has it: a set of k out of n effects has prior ∝ RATE^k / C(n, k).
 """
@@ -36,6 +37,8 @@ PARTNERS = 8
 LARGEST = 3
 LEADERS = 5
 """Sets whose parts and forms are looked at once more."""
+DOUBTED, DOUBTED_EACH = 12, 4
+"""Leading sets, and best sets of every number of effects, whose forms are doubted in the end."""
 STARTS = (0.8, -0.8)
 """Further starts (prior sds) for a single effect: the force is curved in some of them."""
 
@@ -49,6 +52,8 @@ class Search:
     spread: Spread
     fits: dict[tuple[Set, int], Fit] = field(default_factory=dict)
     polished: set[tuple[Set, int]] = field(default_factory=set)
+    doubting: bool = False
+    """Whether a fit also doubts the forms of its effects: only the leading sets are worth that."""
 
     def refit(self, effects: Set, size: int) -> Fit:
         """The best exact refit of a set, from where its best parts ended and from nothing.
@@ -66,7 +71,7 @@ class Search:
     def refit_all(self, keys: Iterable[tuple[Set, int]]) -> None:
         """Refit many sets, each beside a remainder of one size; those that no climb can fit are left out."""
         todo = [key for key in dict.fromkeys(keys) if key not in self.fits]
-        tasks = [(size, self._tries(effects, size)) for effects, size in todo]
+        tasks = [(size, self._tries(effects, size), self.doubting) for effects, size in todo]
         for key, found in zip(todo, self.spread(_best_of, tasks, chunk=4), strict=True):
             if found is not None:
                 self.fits[key] = found
@@ -116,6 +121,20 @@ class Search:
         todo = [k for k in dict.fromkeys(keys) if k in self.fits and k not in self.polished]
         self.polished.update(todo)
         self.fits.update(zip(todo, self.spread(_polished, [self.fits[key] for key in todo]), strict=True))
+
+    def doubt(self) -> None:
+        """Refit the leading sets, and the best of each number of effects, with a doubt about their forms."""
+        sets, count = self.sets, range(LARGEST + 1)
+        chosen = {
+            *sets[:DOUBTED],
+            *(s for k in count for s in [q for q in sets if len(q) == k][:DOUBTED_EACH]),
+        }
+        chosen |= {frozenset(p) for s in sets[:LEADERS] for p in combinations(sorted(s), max(len(s) - 1, 0))}
+        keys = [key for key in self.fits if key[0] in chosen]
+        self.fits.update(
+            zip(keys, self.spread(_doubted, [self.fits[key] for key in keys], chunk=2), strict=True)
+        )
+        self.doubting = True
 
     def log_prior(self, effects: Set) -> float:
         """Log prior of a set (up to a constant)."""
@@ -196,17 +215,24 @@ def search(
             for size in every:
                 found.refit_all((effects, size) for effects in parts)
             _polish(found, [*parts, *leaders])
+        found.doubt()
     found.spread = Alone(problem)
     return found
 
 
-def _best_of(task: tuple[int, list[Try]]) -> Fit | None:
+def _best_of(task: tuple[int, list[Try], bool]) -> Fit | None:
     """The best of some climbs."""
-    size, tries = task
+    size, tries, doubting = task
     best: Fit | None = None
     for forms, start in tries:
         best = _better(best, forms, size, start)
-    return best
+    return _doubted(best) if best is not None and doubting else best
+
+
+def _doubted(found: Fit) -> Fit:
+    """The fit with a doubt about the forms of its effects; as it is where that cannot be climbed."""
+    again = _better(None, tuple(sorted(found.effects)), found.size, _ended(found), doubted=True)
+    return found if again is None else again
 
 
 def _polished(found: Fit) -> Fit:
@@ -219,12 +245,14 @@ def _polished(found: Fit) -> Fit:
     return best
 
 
-def _better(best: Fit | None, forms: tuple[str, ...], size: int, start: dict[str, float]) -> Fit | None:
+def _better(
+    best: Fit | None, forms: tuple[str, ...], size: int, start: dict[str, float], doubted: bool = False
+) -> Fit | None:
     try:
         with warnings.catch_warnings():
             # On its way a climb may pass through shapes that no muscle has.
             warnings.simplefilter("ignore", linalg.LinAlgWarning)
-            found = fit(held_problem(), frozenset(forms), size, start)
+            found = fit(held_problem(), frozenset(forms), size, start, doubted=doubted)
     except np.linalg.LinAlgError:
         return best
     paid = sum(log(len(forms_of(form.partition(":")[0]))) for form in forms)

@@ -69,7 +69,7 @@ def structure_tests(problem: Problem, fitted: Fit) -> list[Structure]:
         return np.asarray(linalg.solve_triangular(root, x, lower=True))
 
     taken = _basis(white(linearise(problem, fitted)[1]))
-    residual = white(problem.force - fitted.force)
+    residual = white(problem.force - fitted.force - fitted.doubt)
     residual = residual - taken @ (taken.T @ residual)
     readings = problem.middle()
     found = []
