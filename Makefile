@@ -9,13 +9,14 @@ export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help calibrate test test-long score benchmark diagnose lint sample clean
+.PHONY: help calibrate test test-long score gains benchmark diagnose lint sample clean
 
 help:
 	@echo "make calibrate   calibrate the bundled data sets; reports in reports/*/report.html"
 	@echo "make test        linters, types, doctests and the test suite"
 	@echo "make test-long   statistical tests of several minutes"
-	@echo "make score       score diagnose on the locked hidden cases (resumable; SET=develop for the others)"
+	@echo "make score       score diagnose on the locked hidden cases (resumable; SET=develop, locked-halved ...)"
+	@echo "make gains       what named causes gain on held-out rows, beside an oracle (resumable; CASES=30)"
 	@echo "make benchmark   times the sampler beside nutpie and PyMC, in an environment of its own"
 	@echo "make diagnose    diagnose the bundled data sets; table in reports/diagnosed.md"
 	@echo "make lint        linters and types alone"
@@ -44,6 +45,10 @@ test-long: $(VENV)/.installed
 SET ?= locked
 score: $(VENV)/.installed
 	cd tests && ../$(BIN)/python -W ignore -m criticism.score $(SET)
+
+CASES ?= 30
+gains: $(VENV)/.installed
+	cd tests && ../$(BIN)/python -W ignore -m criticism.gains $(SET) $(CASES)
 
 BENCHMARKS := .venv-benchmarks
 $(BENCHMARKS)/.installed: pyproject.toml tests/benchmarks/requirements.txt
