@@ -18,7 +18,8 @@ def main() -> None:
     # One BLAS thread: the parallelism is over ensembles, and sums must not depend on the machine.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[variable] = "1"
-    ctrl_c = CtrlC()
+    global _ctrl_c
+    ctrl_c = _ctrl_c = CtrlC()
     signal.signal(signal.SIGINT, ctrl_c)
     try:
         code = _run()
@@ -62,6 +63,15 @@ class CtrlC:
         if os.getpid() == self.process:
             self.pressed = True
             raise Stopped
+
+
+_ctrl_c: CtrlC | None = None
+
+
+def stop_where_pressed() -> None:
+    """Stop here where Ctrl-C was pressed and got lost: Python drops what is raised inside a finaliser."""
+    if _ctrl_c is not None and _ctrl_c.pressed and _ctrl_c.process == os.getpid():
+        raise Stopped
 
 
 def _run() -> int:

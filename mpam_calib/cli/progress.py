@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from mpam_calib.cli import stop_where_pressed
+
 if TYPE_CHECKING:
     from mpam_calib.posterior.sampling import Listener
     from mpam_calib.posterior.sampling import Progress as Figures
@@ -20,7 +22,7 @@ def sampling_progress(max_steps: int) -> Iterator[Listener]:
 
     console = Console(file=sys.stderr)
     if not console.is_terminal:
-        yield lambda figures: None
+        yield lambda figures: stop_where_pressed()
         return
     columns = (
         TextColumn("{task.description:<11}"),
@@ -36,6 +38,7 @@ def sampling_progress(max_steps: int) -> Iterator[Listener]:
 
         def tell(figures: Figures) -> None:
             nonlocal share
+            stop_where_pressed()
             text = ""
             if figures.steps:
                 text = f"({figures.steps} steps, ESS {figures.ess:.0f}, R-hat {figures.rhat:.3f})"
@@ -55,7 +58,7 @@ def stage_progress() -> Iterator[Callable[[str, float], None]]:
 
     console = Console(file=sys.stderr)
     if not console.is_terminal:
-        yield lambda stage, share: None
+        yield lambda stage, share: stop_where_pressed()
         return
     columns = (
         TextColumn("{task.description:<19}"),
@@ -67,4 +70,9 @@ def stage_progress() -> Iterator[Callable[[str, float], None]]:
     )
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("reading", total=1.0)
-        yield lambda stage, share: bar.update(task, description=stage, completed=share)
+
+        def tell(stage: str, share: float) -> None:
+            stop_where_pressed()
+            bar.update(task, description=stage, completed=share)
+
+        yield tell

@@ -16,8 +16,8 @@ from .command import PATIENCE, Result, all_gone, contents, finish, kill, living,
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="signals and /proc as Linux has them")
 
-MANY_BLOCKS = ("--no-correlated-noise", "--no-remainder", "--ess", 1e6, "--max-steps", 640)
-"""Sixteen blocks: they stop at the budget, so that every run has as many, and last until they are killed."""
+MANY_BLOCKS = ("--no-correlated-noise", "--no-remainder", "--ess", 1e6, "--max-steps", 960)
+"""Two dozen blocks: they stop at the budget, so that every run has as many, and last until killed."""
 TABLES = ("summary.csv", "bands.csv", "run.json")
 
 
@@ -127,4 +127,27 @@ def test_ctrl_c_while_a_class_is_made_keeps_the_exit_code(tmp_path: Path) -> Non
     (tmp_path / "stopped.py").write_text(STOPPED_IN_EXEC)
     command = [sys.executable, "-m", "stopped"]
     result = subprocess.run(command, capture_output=True, timeout=60, check=False, cwd=tmp_path)
+    assert (result.returncode, result.stderr) == (130, b"")
+
+
+LOST = """
+import os, signal, sys
+import mpam_calib.cli as cli
+from mpam_calib.cli.progress import stage_progress
+cli._ctrl_c = cli.CtrlC()
+signal.signal(signal.SIGINT, cli._ctrl_c)
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+except KeyboardInterrupt:
+    pass
+with stage_progress() as tell:
+    try:
+        tell("searching", 0.5)
+    except KeyboardInterrupt:
+        sys.exit(130)
+"""
+
+
+def test_ctrl_c_that_got_lost_stops_at_the_next_progress() -> None:
+    result = subprocess.run([sys.executable, "-c", LOST], capture_output=True, timeout=60, check=False)
     assert (result.returncode, result.stderr) == (130, b"")
