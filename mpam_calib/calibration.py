@@ -14,7 +14,7 @@ from mpam_calib.model.model import Model
 from mpam_calib.posterior.checkpoint import Checkpoint
 from mpam_calib.posterior.collapsed import Collapsed, Guide
 from mpam_calib.posterior.convergence import ESS_WANTED
-from mpam_calib.posterior.draws import Draws, Reported, keep_draws, reported
+from mpam_calib.posterior.draws import Draws, Reported, keep_draws, kept_for, reported
 from mpam_calib.posterior.mode import Mode
 from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Sampling, sample
 from mpam_calib.posterior.summary import all_converged, summarise
@@ -111,5 +111,5 @@ def calibrate(
         guide, modes = found
         target = replace(target, guide=guide)
     sampling = sample(target, modes, seed, max_steps, ess_wanted, checkpoint, listener)
-    draws = keep_draws(target, sampling, seed)
+    draws = keep_draws(target, sampling, seed, kept_for(ess_wanted))
     return Calibration(specimen, target, sampling, draws, seed, ess_wanted)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 import typer
@@ -31,13 +32,6 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-# The commands: each module registers its own on ``app``.
-from mpam_calib.cli import init  # noqa: E402, F401  isort: skip
-from mpam_calib.cli import check  # noqa: E402, F401  isort: skip
-from mpam_calib.cli import calibrate  # noqa: E402, F401  isort: skip
-from mpam_calib.cli import predict  # noqa: E402, F401  isort: skip
-from mpam_calib.cli import optimize  # noqa: E402, F401  isort: skip
-from mpam_calib.cli import reproduce  # noqa: E402, F401  isort: skip
-from mpam_calib.cli import simulate  # noqa: E402, F401  isort: skip
-from mpam_calib.cli import diagnose  # noqa: E402, F401  isort: skip
-from mpam_calib.cli import select  # noqa: E402, F401  isort: skip
+# Each command's module registers its own on ``app``, and so needs it first.
+for _name in ORDER:
+    import_module(f"mpam_calib.cli.{_name}")

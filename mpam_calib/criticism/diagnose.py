@@ -116,8 +116,8 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "saturated_share": _round(diagnosis.problem.saturated),
         "repeating_N": _round(verdict.repeating),
         "searched": {
-            "sets": len(diagnosis.search.sets),
-            "refits": len(diagnosis.search.fits),
+            "sets": len({effects for effects, _ in diagnosis.search.searched}),
+            "refits": len(diagnosis.search.searched),
             "largest": LARGEST,
         },
     }

@@ -54,6 +54,8 @@ class Search:
     polished: set[tuple[Set, int]] = field(default_factory=set)
     doubting: bool = False
     """Whether a fit also doubts the forms of its effects: only the leading sets are worth that."""
+    searched: dict[tuple[Set, int], Fit] = field(default_factory=dict)
+    """All that was refitted before the doubt."""
 
     def refit(self, effects: Set, size: int) -> Fit:
         """The best exact refit of a set, from where its best parts ended and from nothing.
@@ -86,7 +88,7 @@ class Search:
             starts = [{}, *(dict.fromkeys(names, value) for value in STARTS if names)]
             return [((form,), start) for e in effects for form in flexible(e) for start in starts]
         if near is not None:
-            return [(tuple(near.effects), _ended(near))]
+            return [(tuple(sorted(near.effects)), _ended(near))]
         # From where the best part ended, and from nothing: a part may have ended in a shape that only
         # made up for what it lacked.
         choice, start = self._from_parts(effects, size)
@@ -131,9 +133,9 @@ class Search:
         }
         chosen |= {frozenset(p) for s in sets[:LEADERS] for p in combinations(sorted(s), max(len(s) - 1, 0))}
         keys = [key for key in self.fits if key[0] in chosen]
-        self.fits.update(
-            zip(keys, self.spread(_doubted, [self.fits[key] for key in keys], chunk=2), strict=True)
-        )
+        doubted = self.spread(_doubted, [self.fits[key] for key in keys], chunk=2)
+        # A doubt has its price in evidence: who does not pay it cannot be compared with those who do.
+        self.searched, self.fits = self.fits, dict(zip(keys, doubted, strict=True))
         self.doubting = True
 
     def log_prior(self, effects: Set) -> float:

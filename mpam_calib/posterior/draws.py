@@ -20,6 +20,11 @@ KEPT = 1000
 """Draws kept of each ensemble."""
 
 
+def kept_for(ess_wanted: float) -> int:
+    """Draws to keep of each of four ensembles: KEPT, or twice the share of effective draws that is wanted."""
+    return max(KEPT, int(np.ceil(0.5 * ess_wanted)))
+
+
 @dataclass(frozen=True)
 class Draws:
     """N draws, ensemble by ensemble: ``u`` (N, d) coordinates, ``values`` name → (N, 1) SI, ``eta`` (N, k).

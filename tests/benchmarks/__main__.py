@@ -164,18 +164,19 @@ def main() -> None:
         for name, outcome in found.items():
             ratios = [base.rates[i] / outcome.rates[i] for i in range(2)]
             print(f"  {label}, {name}: {ratios[0]:.2f}; {ratios[1]:.2f}, peak {outcome.memory:.0f} MiB")
-    _targets(ours, short, full, others, more, more_full)
+    _targets(ours, (short, short_full), full, others, more, more_full)
 
 
 def _targets(
     ours: Outcome,
-    short: Outcome,
+    to_wanted: tuple[Outcome, Outcome],
     full: Outcome,
     others: dict[str, Outcome],
     more: dict[str, Outcome],
     more_full: dict[str, Outcome],
 ) -> None:
-    """Measured beside wanted."""
+    """Measured beside wanted. Memory is that of runs to the size wanted; the table has the long runs'."""
+    short = to_wanted[0]
     rows = [outcome for name, outcome in others.items() if name.endswith("rows")]
     rate = ours.rates[0] / max(outcome.rates[0] for outcome in rows)
     per_cpu = ours.rates[1] / max(outcome.rates[1] for outcome in rows)
@@ -185,7 +186,7 @@ def _targets(
         ours.rates[1] / more[DENSER].rates[1],
         full.rates[1] / more_full[DENSER].rates[1],
     )
-    largest = max(short.memory, full.memory, ours.memory)
+    largest = max(outcome.memory for outcome in to_wanted)
     print("\n| target | wanted | measured |\n|---|---|---|")
     print(
         f"| ESS/s beside the better of the others, all rows | >= 5 | {rate:.1f} (per CPU s {per_cpu:.1f}) |"
@@ -195,7 +196,8 @@ def _targets(
         f"| ESS/s with correlated noise and remainder | >= 1,000 "
         f"| {full.rates[0]:,.0f} (per CPU s {full.rates[1]:,.0f}) |"
     )
-    print(f"| peak memory, MiB | <= 300 | {largest:.0f} |")
+    longest = max(ours.memory, full.memory)
+    print(f"| peak memory to {WANTED:,}, MiB | <= 300 | {largest:.0f} (long runs {longest:.0f}) |")
     print(f"| CPU seconds of sampling, 180,000 rows over 18,000 | <= 1.2 | {growth:.2f} |")
 
 

@@ -22,13 +22,15 @@ def draw(specimen: Specimen, options: Options, ess: float, thin: int) -> Drawn:
     Everything else is in it: the checks whether to go on, and drawing the moduli for each draw.
     """
     watches: list[Stopwatch] = []
+    taken = [(0.0, 0.0)]
 
     def listen(progress: Progress) -> None:
-        if progress.stage == "sampling" and not watches:
+        if progress.stage == "sampling":
             watches.append(Stopwatch())
+            taken.append(watches[0].read())
 
     made = mc.calibrate(specimen, options=options, ess_wanted=ess, max_steps=100_000, listener=listen)
-    wall, cpu = watches[0].read()
+    wall, cpu = taken[-1]
     steps = made.sampling.chain.shape[1]
     # The first block's time is not counted, nor are its draws; a short run is one block.
     counted = made.sampling.chain[:, BLOCK if steps > BLOCK else 0 :: thin]

@@ -38,7 +38,8 @@ def share(problem: Problem) -> np.ndarray:
 
 def with_cause(problem: Problem, wrong: float) -> Problem:
     """The cause hidden in the rows, its form off by a share ``wrong`` that changes sign along the stroke."""
-    x = problem.middle().displacement / problem.model.setting.stroke  # type: ignore[union-attr]
+    assert problem.model.setting is not None
+    x = problem.middle().displacement / problem.model.setting.stroke
     bent = 1.0 + wrong * np.sin(2.0 * np.pi * x)
     return problem.with_force(problem.force + share(problem) * bent)
 

@@ -13,6 +13,8 @@ from rig.protocol import Protocol, Rows, record_rows, sensor_noise
 from rig.specimens import FAMILIES, loops_muscle, sensible, whole_levels
 
 from mpam_calib.model.blueprint import Options, draw_blueprint
+from mpam_calib.model.model import Model
+from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.draws import Draws, keep_draws
 from mpam_calib.posterior.mode import evaluate
 from mpam_calib.posterior.proposal import StudentMixture
@@ -102,6 +104,29 @@ def posterior_draws(fold: Specimen, whole: Specimen, options: Options, seed: int
     return target.model, Draws(u, values, eta, 1)
 
 
+def inside_bands(
+    model: Model,
+    draws: Draws,
+    places: Readings,
+    reading: Array,
+    true: Array,
+    rng: np.random.Generator,
+    narrow: float = 1.0,
+) -> HeldOut:
+    """Whether readings and true forces (n,) lie in the 90 % bands that draws give at their places."""
+    force = predict_force(model, draws.values, draws.eta, places)
+    if "stroke_remainder_sd_N" in draws.values:
+        force = force + draws.values["stroke_remainder_sd_N"] * rng.standard_normal(force.shape)
+    noise = np.hypot(draws.values["noise_sd_N"], draws.values.get("noise_corr_sd_N", 0.0))
+    seen = force + noise * rng.standard_normal(force.shape)
+    inside = []
+    for band, value in ((seen, reading), (force, true)):
+        shrunk = band.mean(axis=0) + narrow * (band - band.mean(axis=0))
+        low, high = np.quantile(shrunk, [0.05, 0.95], axis=0)
+        inside.append((value >= low) & (value <= high))
+    return HeldOut(*inside)
+
+
 def held_out_levels(seed: int, options: Options, exact: bool = False, narrow: float = 1.0) -> list[HeldOut]:
     """Calibrate on every other level and look at those between.
 
@@ -117,15 +142,5 @@ def held_out_levels(seed: int, options: Options, exact: bool = False, narrow: fl
     found = []
     for level in LEFT_OUT:
         mask = whole.loops.level == level
-        force = predict_force(model, draws.values, draws.eta, places.take(mask))
-        if "stroke_remainder_sd_N" in draws.values:
-            force = force + draws.values["stroke_remainder_sd_N"] * rng.standard_normal(force.shape)
-        noise = np.hypot(draws.values["noise_sd_N"], draws.values.get("noise_corr_sd_N", 0.0))
-        seen = force + noise * rng.standard_normal(force.shape)
-        inside = []
-        for band, value in ((seen, reading[mask]), (force, true[mask])):
-            shrunk = band.mean(axis=0) + narrow * (band - band.mean(axis=0))
-            low, high = np.quantile(shrunk, [0.05, 0.95], axis=0)
-            inside.append((value >= low) & (value <= high))
-        found.append(HeldOut(*inside))
+        found.append(inside_bands(model, draws, places.take(mask), reading[mask], true[mask], rng, narrow))
     return found

@@ -14,10 +14,9 @@ from model import build
 from rig.calibration import hyperelastic_muscle, write_calibration_case
 
 from mpam_calib.model.blueprint import Options
-from mpam_calib.posterior.target import predict_force
 from mpam_calib.specimen import read
 
-from .coverage import HeldOut, posterior_draws
+from .coverage import HeldOut, inside_bands, posterior_draws
 
 
 def held_out_levels(seed: int, folder: Path, options: Options, narrow: float = 1.0) -> list[HeldOut]:
@@ -38,15 +37,6 @@ def held_out_levels(seed: int, folder: Path, options: Options, narrow: float = 1
     found = []
     for level in np.unique(loops.level):
         mask = loops.level == level
-        force = predict_force(model, draws.values, draws.eta, places.take(mask))
-        if "stroke_remainder_sd_N" in draws.values:
-            force = force + draws.values["stroke_remainder_sd_N"] * rng.standard_normal(force.shape)
-        noise = np.hypot(draws.values["noise_sd_N"], draws.values.get("noise_corr_sd_N", 0.0))
-        seen = force + noise * rng.standard_normal(force.shape)
-        inside = []
-        for band, value in ((seen, loops.force_N[mask]), (force, true[mask])):
-            shrunk = band.mean(axis=0) + narrow * (band - band.mean(axis=0))
-            low, high = np.quantile(shrunk, [0.05, 0.95], axis=0)
-            inside.append((value >= low) & (value <= high))
-        found.append(HeldOut(*inside))
+        here = loops.force_N[mask], true[mask]
+        found.append(inside_bands(model, draws, places.take(mask), *here, rng, narrow))
     return found
