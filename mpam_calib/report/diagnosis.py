@@ -18,6 +18,7 @@ from mpam_calib.report.page import (
     Figure,
     Headline,
     KeyNumber,
+    Notice,
     Numbers,
     Page,
     Section,
@@ -56,6 +57,7 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
             ]
         ),
     ]
+    lead += [Notice(text) for text in wording.noise_left_aside(specimen, "search")]
     sections = [
         Section("Misfit budget", _budget(found, content)),
         Section("Where the misfit shows", _structure(content)),

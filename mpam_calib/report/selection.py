@@ -7,6 +7,7 @@ import pandas as pd
 from mpam_calib.criticism.select import Selection
 from mpam_calib.report.choices import choices_section
 from mpam_calib.report.page import Block, DataTable, Headline, Notice, Page, Section, Text, Verdict
+from mpam_calib.report.wording import noise_left_aside
 from mpam_calib.specimen.recording import Specimen
 
 SHOWN = 20
@@ -39,7 +40,7 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
         Headline(sentence),
         Verdict("Model selection", "good" if sure else "caution", reasons),
     ]
-    lead += [Notice(text) for text in _left_aside(specimen)]
+    lead += [Notice(text) for text in noise_left_aside(specimen, "ranking")]
     names = [short_name(models.iloc[i]) for i in range(len(found.confusion))]
     ranks = {
         "log_evidence": "{:.2f}", "log_evidence_se": "{:.2g}", "probability": "{:.3g}",
@@ -64,22 +65,6 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
     if found.replicates:
         sections.append(_confusion_section(found, names))
     return Page(specimen.name, "Model selection", lead, sections)
-
-
-def _left_aside(specimen: Specimen) -> list[str]:
-    """What the declaration says of the noise and the ranking does not use."""
-    found = []
-    if specimen.noise.robust:
-        found.append(
-            "Heavy tails of the noise ([noise] robust) are not part of this ranking: bursts are left out "
-            "where the noise is measured, but weigh on the evidence like any reading."
-        )
-    if specimen.noise.growth and specimen.loops is None:
-        found.append(
-            "Growth of the noise with the force ([noise] growth) is not part of this ranking: static "
-            "readings alone do not tell it before a model is fitted."
-        )
-    return found
 
 
 def _confusion_section(found: Selection, names: list[str]) -> Section:

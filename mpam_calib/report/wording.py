@@ -1,4 +1,4 @@
-"""Sentences of the calibration report: what was simulated and whether the sampler settled."""
+"""Sentences of the reports: what was simulated, what was left aside, whether the sampler settled."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 from mpam_calib.report.trust import ESS_LIMIT, RHAT_LIMIT
 from mpam_calib.report.view import Convergence
 from mpam_calib.specimen.declaration import Simulation
+from mpam_calib.specimen.recording import Specimen
 
 _KINEMATICS = {
     "inextensible_braid": "the braid's strands keep their length and the bladder its volume",
@@ -50,6 +51,22 @@ def simulation_sentence(simulation: Simulation) -> str:
 def material_sentence(simulation: Simulation) -> str:
     """The law of a bladder material in one sentence."""
     return f"The law: stress is a polynomial of order {simulation.order} in {_MEASURE[simulation.strain]}."
+
+
+def noise_left_aside(specimen: Specimen, what: str) -> list[str]:
+    """What the declaration says of the noise and this ``what`` (ranking, search) does not use."""
+    found = []
+    if specimen.noise.robust:
+        found.append(
+            f"Heavy tails of the noise ([noise] robust) are not part of this {what}: bursts are left out "
+            "where the noise is measured, but weigh on the evidence like any reading."
+        )
+    if specimen.noise.growth and specimen.loops is None:
+        found.append(
+            f"Growth of the noise with the force ([noise] growth) is not part of this {what}: static "
+            "readings alone do not tell it before a model is fitted."
+        )
+    return found
 
 
 def convergence_sentences(c: Convergence) -> str:

@@ -44,12 +44,16 @@ def test_the_gain_is_measured_on_levels_left_out(runs: tuple[Path, frozenset[str
 def test_nothing_hidden_is_adequate_and_the_bytes_repeat(tmp_path: Path) -> None:
     one = recipes.build_case(next(r for r in sets.recipes("develop") if r.group == "null"))
     rig_case.write_case(one, tmp_path / "specimen", tmp_path / "truth.json")
+    with (tmp_path / "specimen" / "specimen.toml").open("a") as toml:
+        toml.write("\n[noise]\nrobust = true\n")
     for name in ("first", "second"):
         diagnose_to_folder(tmp_path / "specimen", tmp_path / name)
     first, second = ((tmp_path / name / "diagnosis.json").read_bytes() for name in ("first", "second"))
     assert first == second
     content = json.loads(first)
     assert (content["verdict"], content["causes"], content["gain"]) == ("adequate", [], None)
+    # What was declared and is not used is said on the page.
+    assert "Heavy tails of the noise" in (tmp_path / "first" / "report.html").read_text()
 
 
 def test_the_extended_specimen_is_accepted(runs: tuple[Path, frozenset[str]]) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .bending import bending
 from .chain import Sized, force_of
 from .effects import form
 from .effects.friction_stage import reference_speed
@@ -39,6 +40,8 @@ class Case:
     hidden: tuple[Hidden, ...] = ()
     outside: Outside | None = None
     geometry_sd: tuple[tuple[str, float], ...] = ()
+    bent: int = 0
+    """Which way the effects' forms are bent at random (see bending.py); 0: not at all."""
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -65,6 +68,8 @@ def record(case: Case) -> Recording:
     rows = record_rows(case.protocol, case.muscle, case.seed)
     null = force_of(case.muscle, rows)
     true = force_of(case.muscle, rows, case.effects, seed=case.seed) if case.hidden else null
+    if case.bent:
+        true = true + bending(case.muscle, rows, case.effects, case.seed, case.bent)
     if case.protocol.floor_N is not None:
         true, null = np.maximum(true, case.protocol.floor_N), np.maximum(null, case.protocol.floor_N)
     noise = sensor_noise(case.protocol, rows, case.seed)
