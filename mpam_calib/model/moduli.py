@@ -106,8 +106,33 @@ class Law:
         return np.stack(columns, axis=-1)
 
 
+ALIKE = 1e-10
+"""Sine of the angle between a column of the linear block and those before it, below which it adds nothing."""
+
+
 def _exp(x: Array) -> Array:
     return np.exp(np.clip(x, -200.0, 200.0))
+
+
+def _orthogonal(columns: Array) -> Array:
+    """Coefficients (B, p, p) that make columns (B, n, p) of length one orthogonal; zero for one left out.
+
+    Far out rates meet, or leave a single level in sight: a column that says no more than those before it is
+    left out. Gram and Schmidt's way, each column twice.
+    """
+    B, _, p = columns.shape
+    made, coefficients = np.zeros_like(columns), np.zeros((B, p, p))
+    for j in range(p):
+        left, by = columns[:, :, j], np.broadcast_to(np.eye(p)[j], (B, p))
+        for _ in range(2):
+            along = np.einsum("bnk,bn->bk", made, left)
+            left = left - np.einsum("bnk,bk->bn", made, along)
+            by = by - np.einsum("bqk,bk->bq", coefficients, along)
+        size = np.linalg.norm(left, axis=1, keepdims=True)
+        own = size > ALIKE
+        size = np.where(own, size, 1.0)
+        made[:, :, j], coefficients[:, :, j] = own * left / size, own * by / size
+    return coefficients
 
 
 @dataclass(frozen=True)
@@ -157,7 +182,11 @@ class ModuliBlock:
         R = np.asarray(np.linalg.qr(full / norm, mode="r"))
         p = full.shape[2]
         points = full.shape[1]
+        alike = np.any(np.abs(np.diagonal(R, axis1=1, axis2=2)) < ALIKE, axis=1)
+        R[alike] = np.eye(p)
         inverse = np.linalg.solve(R, np.broadcast_to(np.eye(p), R.shape))
+        if alike.any():
+            inverse[alike] = _orthogonal((full / norm)[alike])
         result: Array = self.scale * np.sqrt(points / p) * inverse / np.swapaxes(norm, 1, 2)
         return result
 

@@ -223,3 +223,27 @@ def test_folds_share_the_blueprint():
     rows = build.rows_of(made.loops)
     assert np.array_equal(full.model.remainder.columns(rows), part.model.remainder.columns(rows))
     assert len(part.data.bins) == len(full.data.bins) * 2 // 3
+
+
+@pytest.mark.parametrize("law", ["exponential", "exponential_each"])
+def test_rates_that_no_walker_should_have_still_give_a_force(law: str) -> None:
+    """A stretch move may try any u: rates that meet, and rates that leave one level alone in sight."""
+    model = model_of(law)
+    assert model.moduli is not None
+    names = [p.name for p in model.parameters if p.name.split("_")[0] in ("d", "gap")]
+    priors = {p.name: p.prior for p in model.parameters}
+    u = np.random.default_rng(0).uniform(-36.0, 36.0, (2000, len(names)))
+    u[0], u[1] = -36.0, 36.0
+    values = {name: priors[name].from_normal(u[:, i : i + 1]) for i, name in enumerate(names)}
+    levels, columns = model.moduli.grid or (np.empty(0), np.empty(0))
+    _, transform = model.moduli.transform(values)
+    assert np.isfinite(transform).all()
+    # What is left is still forces of the stated size on the grid: orthogonal, or left out.
+    h = model.moduli.law.basis(levels, np.full(len(levels), -1), values)
+    grid = (h[:, :, None, :, :] * columns[None, None, :, None, :]).reshape(len(u), -1, transform.shape[1])
+    forces = grid @ transform
+    gram = np.swapaxes(forces, 1, 2) @ forces / forces.shape[1] * transform.shape[1] / model.moduli.scale**2
+    kept = np.abs(np.diagonal(gram, axis1=1, axis2=2)) > 0.5
+    assert kept.any(axis=1).all()
+    wanted = np.where(kept[:, :, None] & kept[:, None, :], np.eye(transform.shape[1]), 0.0)
+    np.testing.assert_allclose(gram, wanted, atol=1e-4)

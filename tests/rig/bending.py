@@ -1,9 +1,9 @@
 """Forms bent at random: what an effect does, times a smooth factor that nobody has an equation for.
 
-Each hidden effect's share of the force is multiplied by 1 + g, where g is a sum of a few broad bumps over two
-of contraction, level, time, time at the level, cycle and the share's own size. The strength (rms of g over
-the share) is drawn anew for each effect. Any catalogue is a little wrong about a real rig; this is a little
-wrong in as many ways as there are seeds.
+Each hidden effect's share of the force is multiplied by 1 + g, where g is a sum of a few broad bumps over
+what such an effect may depend on: the share's own size and what OWN says. The strength (rms of g over the
+share) is drawn anew for each effect. Any catalogue is a little wrong about a real rig; this is a little wrong
+in as many ways as there are seeds.
 """
 
 from __future__ import annotations
@@ -16,7 +16,14 @@ from .chain import Sized, force_of
 from .muscle import Array, Muscle
 from .protocol import Rows
 
-STRENGTH = (0.05, 0.25)
+STRENGTH = (0.05, 0.2)
+PLACE = ("contraction", "level")
+OWN: dict[str, tuple[str, ...]] = {
+    "stress_softening": ("contraction", "cycle"),
+    "creep": ("contraction", "time at the level"),
+    "force_drift": ("time",),
+}
+"""What an effect's form may depend on besides its size; all others on the place."""
 LARGEST = 0.6
 """No factor leaves 1 - LARGEST .. 1 + LARGEST, so that no share changes its sign."""
 
@@ -26,21 +33,21 @@ def _unit(v: Array) -> Array:
     return (v - v.min()) / max(float(np.ptp(v)), 1e-12)
 
 
-def _drivers(rows: Rows, share: Array) -> list[Array]:
+def _drivers(effect: str, rows: Rows, share: Array) -> list[Array]:
     """What a factor may depend on, each from 0 to 1."""
-    return [
-        _unit(rows.level_fraction),
-        _unit(rows.setpoint),
-        _unit(rows.time),
-        _unit(np.log1p(rows.level_time)),
-        _unit(1.0 / rows.cycle),
-        _unit(np.abs(share)),
-    ]
+    every = {
+        "contraction": rows.level_fraction,
+        "level": rows.setpoint,
+        "time": rows.time,
+        "time at the level": np.log1p(rows.level_time),
+        "cycle": 1.0 / rows.cycle,
+    }
+    return [_unit(np.abs(share)), *(_unit(every[name]) for name in OWN.get(effect, PLACE))]
 
 
-def _factor(rng: random.Random, rows: Rows, share: Array) -> Array:
+def _factor(rng: random.Random, effect: str, rows: Rows, share: Array) -> Array:
     g = np.zeros(rows.count)
-    for driver in rng.sample(_drivers(rows, share), 2):
+    for driver in rng.sample(_drivers(effect, rows, share), 2):
         for _ in range(3):
             middle, width, height = rng.random(), rng.uniform(0.2, 0.5), rng.gauss(0.0, 1.0)
             g += height * np.exp(-0.5 * ((driver - middle) / width) ** 2)
@@ -60,5 +67,5 @@ def bending(muscle: Muscle, rows: Rows, effects: list[Sized], seed: int, turn: i
         if form.low == form.high:  # one or the other: nothing to bend
             continue
         share = full - force_of(muscle, rows, effects[:k] + effects[k + 1 :], seed=seed)
-        added += share * _factor(rng, rows, share)
+        added += share * _factor(rng, form.id, rows, share)
     return added
