@@ -56,13 +56,35 @@ def simulate(made: Specimen, blueprint, rng: np.random.Generator):
     return u, eta, build.with_force(made, force + noise)
 
 
-def quantities(model, u: Array, eta: Array) -> tuple[list[str], Array]:
-    """Everything reported, and the two predicted forces: (draws, quantities)."""
+def quantities(model, made: Specimen, u: Array, eta: Array) -> tuple[list[str], Array]:
+    """Everything reported, the joint log-likelihood and two predicted forces: (draws, quantities)."""
     values = model.values(u)
     listed = reported(model, Draws(u, values, eta, 1))
     force = predict_force(model, values, eta, PREDICTED)
-    columns = [item.draws for item in listed] + [force[:, 0], force[:, 1]]
-    return [item.name for item in listed] + ["force, loading", "force, unloading"], np.stack(columns, axis=1)
+    likelihood = log_likelihood(model, made, values, eta)
+    columns = [*(item.draws for item in listed), likelihood, force[:, 0], force[:, 1]]
+    names = [*(item.name for item in listed), "log-likelihood", "force, loading", "force, unloading"]
+    return names, np.stack(columns, axis=1)
+
+
+def log_likelihood(model, made: Specimen, values: dict[str, Array], eta: Array) -> Array:
+    """ln p(y | u, η) of the rows (draws,), stroke by stroke and with dense covariances."""
+    assert made.loops is not None
+    loops = made.loops
+    residual = loops.force_N - predict_force(model, values, eta, build.rows_of(loops))
+    found = np.zeros(len(residual))
+    for stroke in np.unique(loops.stroke):
+        rows = np.flatnonzero(loops.stroke == stroke)
+        covariance = values["noise_sd_N"][:, :, None] ** 2 * np.eye(len(rows))
+        if "noise_corr_sd_N" in values:
+            lag = np.abs(loops.time_s[rows][:, None] - loops.time_s[rows])
+            away = np.exp(-lag / values["noise_corr_time_s"][:, :, None])
+            covariance = covariance + values["noise_corr_sd_N"][:, :, None] ** 2 * away
+        root = np.linalg.cholesky(covariance)
+        white = np.linalg.solve(root, residual[:, rows, None])[..., 0]
+        found -= 0.5 * np.sum(white**2, axis=1)
+        found -= np.sum(np.log(np.diagonal(root, axis1=1, axis2=2)), axis=1)
+    return found
 
 
 def replicate(
@@ -83,8 +105,8 @@ def replicate(
             for i in range(0, 10 * L, 50)
         ]
     )
-    names, truth = quantities(target.model, u, eta)
-    _, draws = quantities(target.model, drawn_u, drawn_eta)
+    names, truth = quantities(target.model, made, u, eta)
+    _, draws = quantities(target.model, made, drawn_u[:L], drawn_eta[:L])
     # The joint distance in normal coordinates: what narrows or shifts all parameters together shows here.
     joint = np.concatenate([drawn_u, drawn_eta], axis=1)
     true_joint = np.concatenate([u, eta], axis=1)
@@ -95,7 +117,7 @@ def replicate(
         near, distance = narrowed(joint[:L], centre, factor), []
         for x in (near, true_joint):
             distance.append(np.einsum("ni,ij,nj->n", x - centre, precision, x - centre))
-        below = (narrowed(draws[:L], np.median(draws, axis=0), factor) < truth).sum(axis=0)
+        below = (narrowed(draws, np.median(draws, axis=0), factor) < truth).sum(axis=0)
         ranks.append([*below, int((distance[0] < distance[1]).sum())])
     return [*names, "joint distance"], np.array(ranks)
 
