@@ -3,7 +3,8 @@
 No equation of the catalogue is quite what a rig does. A cause that moves the force by 20 N with an equation
 good to a few per cent leaves some tenths of a newton of its own, and a small second cause must not be named
 for mending them. So each effect of a hypothesis brings columns s(x)·φ_j(x): its share s of the force (N)
-times smooth functions of what drives it, with coefficients N(0, DOUBT²/degree²) that are integrated out.
+times smooth functions of what drives it, with coefficients N(0, δ²/degree²) that are integrated out. How far
+equations are off, δ, is not known either: every one of DOUBTS has its say, each as likely as the others.
 Kennedy and O'Hagan 2001 (doi:10.1111/1467-9868.00294) call this a model's discrepancy; here each cause has
 one, and it vanishes with the cause.
 """
@@ -21,8 +22,8 @@ from mpam_calib.model.readings import Readings
 
 Array = NDArray[np.float64]
 
-DOUBT = 0.03
-"""Prior sd of a share of an effect's force that its equation gets wrong along one smooth function."""
+DOUBTS = (0.02, 0.06, 0.18)
+"""Prior sds of a share of an effect's force that its equation gets wrong along one smooth function."""
 DEGREE = 3
 PLACE = ("contraction", "pressure")
 """Drivers that every effect may depend on, and jointly."""
@@ -31,7 +32,7 @@ PLACE = ("contraction", "pressure")
 def doubts(
     chain: Chain, without: dict[str, Chain], values: Values, eta: Array, readings: Readings, guide: Array
 ) -> Array:
-    """Columns (m, r) in newtons for all effects in question; their coefficients are N(0, 1).
+    """Columns (m, r) in newtons for all effects in question; their coefficients are N(0, δ²).
 
     ``without`` holds, for each of these effects, the chain that lacks it; ``values`` (1, 1) and ``eta``
     (p,) are where the force is looked at, ``guide`` (m,) an estimate of it (N).
@@ -68,4 +69,4 @@ def _functions(chain: Chain, item: Effect, readings: Readings, guide: Array) -> 
         for j in range(1, DEGREE)
         if i + j <= DEGREE
     ]
-    return DOUBT * np.stack(columns, axis=1)
+    return np.stack(columns, axis=1)

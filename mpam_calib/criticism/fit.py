@@ -7,14 +7,14 @@ with the Gauss-Newton Hessian. Effects may bring a doubt about their forms
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from mpam_calib.criticism.climb import Climb
+from mpam_calib.criticism.climb import Climb, Place
 from mpam_calib.criticism.doubt import doubts
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.blueprint import Blueprint
@@ -30,8 +30,8 @@ class Fit:
     """A refitted hypothesis: its effects, the remainder's size, coordinates and how good it is.
 
     ``u`` (d,), ``eta`` (p,) and the doubt's ``zeta`` (r,) at the mode with covariance (d + p + r, d + p + r);
-    ``force`` (n,) the model's and ``doubt`` (n,) what the doubt adds, N; ``log_evidence`` in nats, ``chi2``
-    the whitened sum of squares.
+    ``force`` (n,) the model's and ``doubt`` (n,) what the doubt adds, N; ``log_evidence`` in nats, summed
+    over the doubts in play, of which ``doubt_sd`` is the likeliest; ``chi2`` the whitened sum of squares.
     """
 
     effects: frozenset[str]
@@ -43,6 +43,7 @@ class Fit:
     covariance: Array
     force: Array
     doubt: Array
+    doubt_sd: float
     log_evidence: float
     chi2: float
 
@@ -65,7 +66,7 @@ def chain_for(key: str, effects: frozenset[str]) -> Chain:
 def doubt_columns(
     key: str, effects: frozenset[str], values: dict[str, Array], eta: Array, readings: Readings, guide: Array
 ) -> Array:
-    """Columns (m, r), N, of the doubt about the effects' forms: see :func:`doubt.doubts`."""
+    """Columns (m, r), N, of the doubt about the effects' forms, for δ = 1: see :func:`doubt.doubts`."""
     without = {e: chain_for(key, effects - {e}) for e in effects}
     return doubts(chain_for(key, effects), without, values, eta, readings, guide)
 
@@ -76,32 +77,45 @@ def fit(
     size: int,
     start: dict[str, float] | None = None,
     blueprint: Blueprint | None = None,
-    doubted: bool = False,
+    doubts: tuple[float, ...] = (),
 ) -> Fit:
     """Refit the simulation with these effects against a remainder of SIZES[size].
 
     ``start`` gives coordinates by parameter name to start from (0 otherwise); ``blueprint`` another
-    declared simulation than the problem's. ``doubted`` effects bring a doubt about their forms.
+    declared simulation than the problem's; ``doubts`` how far the effects' forms may be off, with equal
+    prior probabilities (none: not at all).
     """
     key = (blueprint or problem.blueprint).model_dump_json()
     chain, n = chain_for(key, effects), len(problem)
     climb = Climb(problem, chain, size, np.empty((n, 0)))
     u = np.array([(start or {}).get(name, 0.0) for name in climb.names], dtype=np.float64)
     place = climb.climb(u, climb.guide(), np.zeros(chain.linear_size))
-    if effects and doubted:
-        # The doubt is in proportion to the sizes found so far; with it they settle once more.
-        readings, first, second = problem.lean
-        columns = doubt_columns(key, effects, climb.values(place.u[None]), place.eta, readings, place.guide)
-        climb = Climb(problem, chain, size, 0.5 * (columns[first] + columns[second]))
-        place = climb.climb(place.u, place.guide, place.eta)
-    eta, zeta = np.split(place.eta, [chain.linear_size])
+    if not effects or not doubts:
+        return _fitted(effects, climb, place, 0.0)
+    # A doubt is in proportion to the sizes found so far; with it they settle once more.
+    readings, first, second = problem.lean
+    columns = doubt_columns(key, effects, climb.values(place.u[None]), place.eta, readings, place.guide)
+    columns = 0.5 * (columns[first] + columns[second])
+    found = []
+    for doubt in doubts:
+        climb = Climb(problem, chain, size, doubt * columns)
+        place = climb.climb(place.u, place.guide, place.eta[: chain.linear_size])
+        found.append(_fitted(effects, climb, place, doubt))
+    evidence = np.logaddexp.reduce([f.log_evidence for f in found]) - np.log(len(found))
+    return replace(max(found, key=lambda f: f.log_evidence), log_evidence=float(evidence))
+
+
+def _fitted(effects: frozenset[str], climb: Climb, place: Place, doubt: float) -> Fit:
+    """The fit at a mode, with Laplace's evidence."""
+    problem, p = climb.problem, climb.chain.linear_size
+    eta, zeta = np.split(place.eta, [p])
     hessian = place.J.T @ place.J + np.eye(place.J.shape[1])
     factor = linalg.cho_factor(hessian, lower=True)
     log_det = 2.0 * float(np.sum(np.log(np.diagonal(factor[0]))))
-    evidence = place.objective - 0.5 * (problem.log_dets[size] + n * np.log(2.0 * np.pi) + log_det)
+    constant = problem.log_dets[climb.size] + len(problem) * np.log(2.0 * np.pi)
     return Fit(
         effects=effects,
-        size=size,
+        size=climb.size,
         names=climb.names,
         u=place.u,
         eta=eta,
@@ -109,6 +123,7 @@ def fit(
         covariance=np.asarray(linalg.cho_solve(factor, np.eye(len(hessian)))),
         force=place.force,
         doubt=climb.extra @ zeta,
-        log_evidence=float(evidence),
+        doubt_sd=doubt,
+        log_evidence=float(place.objective - 0.5 * (constant + log_det)),
         chi2=float(place.residual @ place.residual),
     )

@@ -169,6 +169,6 @@ def linearise(problem: Problem, fitted: Fit, blueprint: Blueprint | None = None)
     J = np.concatenate([(mean[1:] - mean[0]).T / STEP, X], axis=1)
     if not len(fitted.zeta):
         return mean[0], J
-    columns = doubt_columns(key, fitted.effects, one, fitted.eta, problem.readings, guide)
+    columns = fitted.doubt_sd * doubt_columns(key, fitted.effects, one, fitted.eta, problem.readings, guide)
     D = 0.5 * (columns[:n] + columns[n:])
     return mean[0] + D @ fitted.zeta, np.concatenate([J, D], axis=1)

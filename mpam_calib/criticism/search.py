@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from mpam_calib.criticism.doubt import DOUBTS
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
 from mpam_calib.criticism.spread import Alone, Spread, held_problem, spread_over
@@ -28,7 +29,7 @@ Set = frozenset[str]
 Try = tuple[tuple[str, ...], dict[str, float]]
 """Forms of the effects, and coordinates to start from."""
 
-RATE = 0.03
+RATE = 0.01
 """Prior odds of one more cause: a passenger must not come close to the set that it rides on."""
 WIDTH = 6
 """Sets of each size that are extended further."""
@@ -233,7 +234,7 @@ def _best_of(task: tuple[int, list[Try], bool]) -> Fit | None:
 
 def _doubted(found: Fit) -> Fit:
     """The fit with a doubt about the forms of its effects; as it is where that cannot be climbed."""
-    again = _better(None, tuple(sorted(found.effects)), found.size, _ended(found), doubted=True)
+    again = _better(None, tuple(sorted(found.effects)), found.size, _ended(found), DOUBTS)
     return found if again is None else again
 
 
@@ -248,13 +249,17 @@ def _polished(found: Fit) -> Fit:
 
 
 def _better(
-    best: Fit | None, forms: tuple[str, ...], size: int, start: dict[str, float], doubted: bool = False
+    best: Fit | None,
+    forms: tuple[str, ...],
+    size: int,
+    start: dict[str, float],
+    doubts: tuple[float, ...] = (),
 ) -> Fit | None:
     try:
         with warnings.catch_warnings():
             # On its way a climb may pass through shapes that no muscle has.
             warnings.simplefilter("ignore", linalg.LinAlgWarning)
-            found = fit(held_problem(), frozenset(forms), size, start, doubted=doubted)
+            found = fit(held_problem(), frozenset(forms), size, start, doubts=doubts)
     except np.linalg.LinAlgError:
         return best
     paid = sum(log(len(forms_of(form.partition(":")[0]))) for form in forms)

@@ -1,6 +1,7 @@
 """Score ``diagnose`` on a set of hidden-effect cases: in tests/, ``python -m criticism.score locked``.
 
-``locked-halved`` has the same cases with every effect at half its size.
+``locked-halved`` has the same cases with every effect at half its size; ``develop-bent`` has develop's with
+their effects' forms bent at random.
 Every case is one line of ``reports/score_<set>.csv``; a second run goes on where the first stopped. The
 rates that it prints are those of the issue, each with its binomial (Wilson) interval.
 """
@@ -11,7 +12,7 @@ import csv
 import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -34,8 +35,8 @@ from mpam_calib.units import si_factor
 
 FIELDS = ["name", "group", "truth", "outside", "word", "named", "listed", "probability", "inside", "sized"]
 LISTED = 5
-HALVED = "-halved"
-"""What the name of a set ends in whose effects are halved."""
+HALVED, BENT = "-halved", "-bent"
+"""What the name of a set ends in whose effects are halved, or bent."""
 NATS = 10.0
 """Nats by which the oracle must prefer the truth for a case to count as separable."""
 
@@ -75,11 +76,13 @@ def _inside(search: Search, effects: frozenset[str], one: rig_case.Case) -> tupl
     return hits, of
 
 
-def score_case(recipe: recipes.Recipe, halved: bool = False) -> Scored:
-    """Record one case, read it as a specimen folder, search and judge."""
+def score_case(recipe: recipes.Recipe, which: str = "") -> Scored:
+    """Record one case, read it as a specimen folder, search and judge; ``which`` is the set's name."""
     one = recipes.build_case(recipe)
-    if halved:
+    if which.endswith(HALVED):
         one = recipes.halved(one)
+    elif which.endswith(BENT):
+        one = replace(one, bent=1)
     with tempfile.TemporaryDirectory() as folder:
         rig_case.write_case(one, Path(folder) / "specimen", Path(folder) / "truth.json")
         try:
@@ -144,9 +147,14 @@ def wilson(hits: int, of: int) -> tuple[float, float]:
     return float(middle - half), float(middle + half)
 
 
+def plain(which: str) -> str:
+    """The set's name without what was done to its effects."""
+    return which.removesuffix(HALVED).removesuffix(BENT)
+
+
 def rates(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
     """The issue's rates as (what, hits, of)."""
-    table = margins.read_margins(which.removesuffix(HALVED))
+    table = margins.read_margins(plain(which))
     column = "margin_halved" if which.endswith(HALVED) else "margin"
     separable = {name for name, row in table.items() if row[column] and float(row[column]) >= NATS}
     beaten = {name for name, row in table.items() if row[column] and float(row[column]) <= 0.0}
@@ -219,16 +227,15 @@ def main(which: str, shard: int = 0, shards: int = 1, workers: int = 2) -> None:
     path.parent.mkdir(exist_ok=True)
     done = list(csv.DictReader(path.open())) if path.exists() else []
     names = {row["name"] for row in done}
-    halved = which.endswith(HALVED)
-    todo = [r for r in sets.recipes(which.removesuffix(HALVED))[shard::shards] if r.name not in names]
-    if halved:
+    todo = [r for r in sets.recipes(plain(which))[shard::shards] if r.name not in names]
+    if plain(which) != which:
         todo = [r for r in todo if r.effects and not r.outside]
     todo.sort(key=lambda r: r.seed)  # so that what an interrupted run has done is a fair sample
     with path.open("a", newline="") as file, ProcessPoolExecutor(workers) as pool:
         writer = csv.writer(file, lineterminator="\n")
         if not done:
             writer.writerow(FIELDS)
-        for scored in pool.map(score_case, todo, [halved] * len(todo)):
+        for scored in pool.map(score_case, todo, [which] * len(todo)):
             writer.writerow(_row(scored))
             file.flush()
     everything = [_parsed(row) for row in csv.DictReader(path.open())]

@@ -7,10 +7,11 @@ import pytest
 from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.doubt import DOUBT
+from mpam_calib.criticism.doubt import DOUBTS
 from mpam_calib.criticism.fit import Fit, chain_for, doubt_columns, fit
 from mpam_calib.criticism.problem import Problem
 
+DOUBT = DOUBTS[1]
 CAUSE, SIZE = "length_offset", 0.3
 """The hidden cause and its size in prior sds."""
 PASSENGER = "braid_angle"
@@ -44,10 +45,10 @@ def with_cause(problem: Problem, wrong: float) -> Problem:
     return problem.with_force(problem.force + share(problem) * bent)
 
 
-def lead_of_passenger(problem: Problem, doubted: bool) -> float:
+def lead_of_passenger(problem: Problem, doubts: tuple[float, ...]) -> float:
     """Nats by which the passenger beside the cause does better than the cause alone."""
     alone, beside = (
-        fit(problem, frozenset(s), 0, {"offset_mm": SIZE}, doubted=doubted)
+        fit(problem, frozenset(s), 0, {"offset_mm": SIZE}, doubts=doubts)
         for s in ([f"{CAUSE}:bent"], [f"{CAUSE}:bent", PASSENGER])
     )
     return beside.log_evidence - alone.log_evidence
@@ -56,7 +57,7 @@ def lead_of_passenger(problem: Problem, doubted: bool) -> float:
 def test_a_passenger_that_mends_a_form_loses_its_lead(problem: Problem) -> None:
     """A form that is off by a multiple of the doubt makes a passenger; the doubt takes its lead."""
     made = with_cause(problem, 3.0 * DOUBT)
-    plain, doubted = lead_of_passenger(made, False), lead_of_passenger(made, True)
+    plain, doubted = lead_of_passenger(made, ()), lead_of_passenger(made, DOUBTS)
     assert plain > 5.0
     assert doubted < -2.0
 
@@ -64,8 +65,8 @@ def test_a_passenger_that_mends_a_form_loses_its_lead(problem: Problem) -> None:
 def test_where_the_form_holds_nothing_is_doubted_away(problem: Problem) -> None:
     """Where the equation is the real one, no passenger gains, and the doubt stays small beside the cause."""
     made = with_cause(problem, 0.0)
-    assert lead_of_passenger(made, True) < -2.0
-    found = fit(made, frozenset([CAUSE]), 0, {"offset_mm": SIZE}, doubted=True)
+    assert lead_of_passenger(made, DOUBTS) < -2.0
+    found = fit(made, frozenset([CAUSE]), 0, {"offset_mm": SIZE}, doubts=DOUBTS)
     assert 0.0 < float(np.mean(found.doubt**2)) < DOUBT**2 * float(np.mean(share(problem) ** 2))
     assert found.u[found.names.index("offset_mm")] == pytest.approx(SIZE, abs=0.1 * SIZE)
 
@@ -77,7 +78,7 @@ def test_a_second_cause_of_its_own_keeps_its_lead(problem: Problem) -> None:
     drift = rows.time / rows.time.max() * 6.0 * made.noise_level.total
     made = made.with_force(made.force + drift)
     sets_ = [frozenset([CAUSE]), frozenset([CAUSE, "force_drift"])]
-    one, two = (fit(made, s, 0, {"offset_mm": SIZE}, doubted=True) for s in sets_)
+    one, two = (fit(made, s, 0, {"offset_mm": SIZE}, doubts=DOUBTS) for s in sets_)
     assert two.log_evidence > one.log_evidence + 20.0
 
 
