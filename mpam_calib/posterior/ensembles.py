@@ -17,9 +17,6 @@ from mpam_calib.posterior.proposal import IndependenceMove, StudentMixture
 
 Array = NDArray[np.float64]
 
-INDEPENDENT = 0.9
-"""Share of steps that propose from the fitted mixture; the others find their way where it does not fit."""
-
 
 @dataclass(frozen=True)
 class EnsembleState:
@@ -40,16 +37,24 @@ class Block:
     state: EnsembleState
 
 
-def advance(task: tuple[EnsembleState, StudentMixture, int]) -> Block:
+@dataclass(frozen=True)
+class Moves:
+    """A share ``independent`` of a walker's steps proposes from the mixture, the others find their way."""
+
+    mixture: StudentMixture
+    independent: float
+
+
+def advance(task: tuple[EnsembleState, Moves, int]) -> Block:
     """Run one ensemble for a number of steps (in a worker)."""
-    state, mixture, steps = task
+    state, chosen, steps = task
     target = held_target()
     walkers, d = state.coords.shape
     moves = [
-        (IndependenceMove(mixture), INDEPENDENT),
-        (DEMove(), 0.6 * (1.0 - INDEPENDENT)),
-        (DESnookerMove(), 0.1 * (1.0 - INDEPENDENT)),
-        (StretchMove(), 0.3 * (1.0 - INDEPENDENT)),
+        (IndependenceMove(chosen.mixture), chosen.independent),
+        (DEMove(), 0.6 * (1.0 - chosen.independent)),
+        (DESnookerMove(), 0.1 * (1.0 - chosen.independent)),
+        (StretchMove(), 0.3 * (1.0 - chosen.independent)),
     ]
     sampler = EnsembleSampler(walkers, d, lambda u: evaluate(target, u), moves=moves, vectorize=True)
     start = State(state.coords, log_prob=state.log_prob, random_state=state.random)

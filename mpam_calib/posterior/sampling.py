@@ -12,16 +12,17 @@ from mpam_calib.posterior.batch import batch_size
 from mpam_calib.posterior.checkpoint import Checkpoint
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.convergence import ESS_WANTED, Diagnostics, diagnose_chains
-from mpam_calib.posterior.ensembles import Block, EnsembleState, advance, evaluate_held, start_states
+from mpam_calib.posterior.ensembles import Block, EnsembleState, Moves, advance, evaluate_held, start_states
 from mpam_calib.posterior.mode import Mode
 from mpam_calib.posterior.pool import workers
-from mpam_calib.posterior.proposal import StudentMixture
 from mpam_calib.posterior.warmup import WarmUp, warm_up
 
 Array = NDArray[np.float64]
 
 ENSEMBLES = 4
 BLOCK = 40
+LEAST = 160
+"""Steps at least where no mixture fits: a tail that no walker has met shows in no figure."""
 PATIENCE = 1.2, 1.5
 """Least and most by which the draws grow before they are looked at again: a look costs as much as they do."""
 MAX_STEPS = 4000
@@ -84,8 +85,8 @@ def sample(
     blocks: list[list[Block]] = []
     with workers(target, ENSEMBLES) as pool:
 
-        def run(states: list[EnsembleState], mixture: StudentMixture, steps: int) -> list[Block]:
-            return pool.map(advance, [(state, mixture, steps) for state in states], chunksize=1)
+        def run(states: list[EnsembleState], moves: Moves, steps: int) -> list[Block]:
+            return pool.map(advance, [(state, moves, steps) for state in states], chunksize=1)
 
         warm: WarmUp | None = checkpoint.load("warm_up") if checkpoint else None
         if warm is None:
@@ -107,7 +108,7 @@ def sample(
             name = f"block_{len(blocks):05d}"
             block: list[Block] | None = checkpoint.load(name) if checkpoint else None
             if block is None:
-                block = run(states, warm.mixture, min(BLOCK, max_steps))
+                block = run(states, warm.moves, min(BLOCK, max_steps))
                 if checkpoint:
                     checkpoint.save(name, block)
             states = [b.state for b in block]
@@ -120,7 +121,7 @@ def sample(
             ess = float(min(figures.ess_bulk.min(), figures.ess_tail.min()))
             due = round(steps * min(max(PATIENCE[0], ess_wanted / ess), PATIENCE[1]))
             tell(Progress("sampling", steps, float(figures.rhat.max()), ess, min(ess / ess_wanted, 1.0)))
-            enough = figures.meets(ess_wanted)
+            enough = figures.meets(ess_wanted) and (warm.fits or steps >= LEAST)
             if enough or steps + BLOCK > max_steps:
                 break
     log_prob = np.concatenate([np.stack([b.log_prob for b in part]) for part in blocks], axis=1)

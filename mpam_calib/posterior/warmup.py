@@ -1,9 +1,10 @@
 """Warm-up: fit the independence proposal to the posterior before the draws that count.
 
 Laplace's covariance at the modes starts it; weighted draws from it refit it (adaptive importance
-sampling), with a few components for a posterior that is askew. Where too few of them carry weight, rounds
-of the ensembles themselves refit it, climbing again from any walker that found a better place. A last round
-lets the over-dispersed starts settle, and its many draws fit the proposal that is kept.
+sampling), with a few components for a posterior that is askew. Where enough of them carry weight, one round
+of the ensembles lets their over-dispersed starts settle. Where not, the posterior is bent, and what a mixture
+misses of a bent tail its own draws cannot show: there the walkers explore by moves that need no mixture,
+climbing again from any that found a better place, and the mixture stays the smaller part of the moves.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.posterior.collapsed import Collapsed
-from mpam_calib.posterior.ensembles import Block, EnsembleState
+from mpam_calib.posterior.ensembles import Block, EnsembleState, Moves
 from mpam_calib.posterior.mode import Mode, climb, curvature
 from mpam_calib.posterior.proposal import CLOSE_FREEDOM, FREEDOM, StudentMixture, fit_normals
 
@@ -25,29 +26,38 @@ INFLATION = 1.15
 RELEVANT = 8.0
 """Modes whose evidence is further below the best (nats) get no component of their own."""
 WEIGHTED_ROUNDS, WEIGHTED_DRAWS = 4, 1000
-GOOD_SHARE, POOR_SHARE = 0.7, 0.1
-"""Effective share of weighted draws at which the proposal is good; or so poor that walkers must help."""
-COMPONENTS = 3
+GOOD_SHARE = 0.7
+"""Effective share of weighted draws at which the proposal is good."""
+INDEPENDENT, SHARED, EXPLORING = 0.9, 0.4, 0.1
+"""Share of steps that propose from a good mixture, from another one, and while walkers explore."""
+COMPONENTS, MORE_COMPONENTS = 3, 6
+"""Of a mixture that is fitted to weighted draws, and to exploring walkers."""
 MODES_SHARE = 0.1
 """Share of the proposal that stays with the modes, whatever was drawn."""
-WALKER_ROUNDS, STEPS = 5, 25
+STEPS, ROUNDS, EXPLORED = 25, 4, 60
+"""Steps in which starts settle; rounds of exploring, and the steps of each."""
 ENOUGH = 0.3
-"""Accepted share at which walkers have fitted the proposal well enough."""
+"""Accepted share at which walkers that settled are fit to be fitted."""
 BETTER = 3.0
 """Nats by which a walker must beat every known mode to be climbed from."""
 
-Run = Callable[[list[EnsembleState], StudentMixture, int], list[Block]]
+Run = Callable[[list[EnsembleState], Moves, int], list[Block]]
 Evaluate = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
 class WarmUp:
-    """States to go on from, the frozen proposal, the modes met, and how good it was round by round."""
+    """States to go on from, the moves from here on, the modes met, and how good they were round by round."""
 
     states: list[EnsembleState]
-    mixture: StudentMixture
+    moves: Moves
     modes: list[Mode]
     accepted: list[float]
+
+    @property
+    def fits(self) -> bool:
+        """Whether the mixture is as good as the posterior itself, and few steps will do."""
+        return self.moves.independent == INDEPENDENT
 
 
 def _components(modes: list[Mode]) -> tuple[list[Array], list[Array]]:
@@ -61,10 +71,10 @@ def laplace_mixture(modes: list[Mode]) -> StudentMixture:
     return StudentMixture.build(*_components(modes))
 
 
-def _with_fit(modes: list[Mode], x: Array, weight: Array) -> StudentMixture:
+def _with_fit(modes: list[Mode], x: Array, weight: Array, components: int = COMPONENTS) -> StudentMixture:
     """What was drawn (n, d), and a little of the modes' curvature."""
     effective = 1.0 / float(np.sum(weight**2))
-    count = COMPONENTS if effective > 20 * COMPONENTS * x.shape[1] else 1
+    count = components if effective > 20 * components * x.shape[1] else 1
     means, covariances = _components(modes)
     fitted = fit_normals(x, weight, count)
     of_modes = np.full(len(means), MODES_SHARE / len(means))
@@ -73,10 +83,10 @@ def _with_fit(modes: list[Mode], x: Array, weight: Array) -> StudentMixture:
     return StudentMixture.build([*means, *fitted[0]], [*covariances, *fitted[1]], shares, freedom)
 
 
-def _with_walkers(modes: list[Mode], blocks: list[Block]) -> StudentMixture:
+def _with_walkers(modes: list[Mode], blocks: list[Block], components: int = COMPONENTS) -> StudentMixture:
     """What the walkers drew in the second half of their blocks, and a little of the modes' curvature."""
     drawn = np.concatenate([b.chain[len(b.chain) // 2 :].reshape(-1, b.chain.shape[2]) for b in blocks])
-    return _with_fit(modes, drawn, np.full(len(drawn), 1.0 / len(drawn)))
+    return _with_fit(modes, drawn, np.full(len(drawn), 1.0 / len(drawn)), components)
 
 
 def _weigh(modes: list[Mode], evaluate: Evaluate, seed: int) -> tuple[StudentMixture, list[float]]:
@@ -120,18 +130,23 @@ def warm_up(
     """
     mixture, accepted = _weigh(modes, evaluate, seed)
     states = starts(mixture)
-    rounds = WALKER_ROUNDS if accepted[-1] < POOR_SHARE else 1
-    for number in range(rounds):
-        blocks = run(states, mixture, STEPS)
-        states = [block.state for block in blocks]
-        accepted.append(float(np.mean([block.accepted for block in blocks])))
-        if number >= 2 and accepted[-1] >= ENOUGH:
-            break
-        # The first round still carries the wide starts.
-        if 0 < number < rounds - 1:
-            modes = _climb_again(target, blocks, modes)
+    if accepted[-1] >= GOOD_SHARE:
+        blocks = run(states, Moves(mixture, INDEPENDENT), STEPS)
+        accepted.append(_accepted(blocks))
+        # Walkers that hardly moved are still their wide starts.
+        if accepted[-1] >= ENOUGH:
             mixture = _with_walkers(modes, blocks)
-    # Walkers that hardly moved are still their wide starts.
-    if accepted[-1] >= ENOUGH:
-        mixture = _with_walkers(modes, blocks)
-    return WarmUp(states, mixture, modes, accepted)
+        return WarmUp([block.state for block in blocks], Moves(mixture, INDEPENDENT), modes, accepted)
+    for number in range(ROUNDS):
+        blocks = run(states, Moves(mixture, EXPLORING), EXPLORED)
+        states = [block.state for block in blocks]
+        accepted.append(_accepted(blocks))
+        # The first round still carries the wide starts.
+        if number > 0:
+            modes = _climb_again(target, blocks, modes)
+            mixture = _with_walkers(modes, blocks, MORE_COMPONENTS)
+    return WarmUp(states, Moves(mixture, SHARED), modes, accepted)
+
+
+def _accepted(blocks: list[Block]) -> float:
+    return float(np.mean([block.accepted for block in blocks]))
