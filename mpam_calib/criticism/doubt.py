@@ -22,7 +22,7 @@ from mpam_calib.model.readings import Readings
 
 Array = NDArray[np.float64]
 
-DOUBTS = (0.02, 0.06, 0.18)
+DOUBTS = (0.02, 0.06)
 """Prior sds of a share of an effect's force that its equation gets wrong along one smooth function."""
 DEGREE = 3
 PLACE = ("contraction", "pressure")

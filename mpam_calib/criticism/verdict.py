@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from mpam_calib.criticism.budget import remainder_rms
+from mpam_calib.criticism.budget import remainder_rms, structured
 from mpam_calib.criticism.problem import SIZES
 from mpam_calib.criticism.repeat import repeating_rms
 from mpam_calib.criticism.search import Search, Set
@@ -53,8 +53,11 @@ def judge(found: Search) -> Verdict:
     problem = found.problem
     repeating = _repeating(found, leading, size)
     fine = repeating > REPEAT_SIZE * problem.noise_level.total
-    if problem.saturated > 0.0 or fine or _structure_left(found, leading, size):
+    unlessened = bool(leading) and not _lessens(found, leading)
+    if problem.saturated > 0.0 or fine or unlessened or _structure_left(found, leading, size):
         standing = _standing(found, leading)
+        if not _lessens(found, standing):
+            standing = frozenset()
         return Verdict("unexplained", leading, standing, probabilities, marginals, size, repeating)
     if not leading and probabilities[leading] > 0.5:
         return Verdict("adequate", leading, frozenset(), probabilities, marginals, size)
@@ -78,6 +81,16 @@ def _structure_left(found: Search, leading: Set, size: int) -> bool:
     if bare is not None and held.log_evidence - bare.log_evidence < LEAD:
         return False
     return remainder_rms(found.problem, held) > NOISE_SIZE * found.problem.noise_level.total
+
+
+def _lessens(found: Search, effects: Set) -> bool:
+    """Whether the causes leave less misfit than there was, what they leave to doubts about them included.
+
+    A cause of a huge size would otherwise be a licence to doubt it.
+    """
+    problem = found.problem
+    after = structured(problem, found.refit(effects, 0))
+    return after <= structured(problem, found.refit(frozenset(), 0))
 
 
 def _repeating(found: Search, leading: Set, size: int) -> float:

@@ -1,0 +1,54 @@
+"""The rules of the verdict, on searches whose fits are made up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rig import sets
+
+from criticism.test_hypotheses import problem_of, specimen_of
+from mpam_calib.criticism.fit import fit
+from mpam_calib.criticism.problem import SIZES, Problem
+from mpam_calib.criticism.search import Search
+from mpam_calib.criticism.spread import Alone
+from mpam_calib.criticism.verdict import judge
+
+CAUSE = frozenset(["length_offset"])
+NOTHING: frozenset[str] = frozenset()
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
+    found = problem_of(specimen_of(recipe.name))
+    # Something is there to explain: an offset of the force, three times the noise.
+    return found.with_force(found.force + 3.0 * found.noise_level.total)
+
+
+def search_where_the_cause_leaves(problem: Problem, share: float) -> Search:
+    """A search whose cause leads by far and leaves this share of the misfit."""
+    found = Search(problem, tuple(CAUSE), Alone(problem))
+    for size in range(len(SIZES)):
+        nothing = found.fits[NOTHING, size] = fit(problem, NOTHING, size)
+        left = share * (problem.force - found.fits[NOTHING, 0].force)
+        cause = fit(problem, CAUSE, size)
+        evidence = nothing.log_evidence + (300.0 if size == 0 else 0.0)
+        found.fits[CAUSE, size] = replace(cause, force=problem.force - left, log_evidence=evidence)
+    best = max(f.log_evidence for f in found.fits.values())
+    found.fits[CAUSE, 0] = replace(found.fits[CAUSE, 0], log_evidence=best + 100.0)
+    return found
+
+
+def test_a_cause_that_lessens_the_misfit_is_named(problem: Problem) -> None:
+    verdict = judge(search_where_the_cause_leaves(problem, 0.1))
+    assert (verdict.word, verdict.standing) == ("named", CAUSE)
+
+
+def test_a_cause_that_leaves_more_than_there_was_is_not(problem: Problem) -> None:
+    """However much evidence its doubt has earned it."""
+    found = search_where_the_cause_leaves(problem, 1.5)
+    assert np.argmax([found.score(s) for s in (NOTHING, CAUSE)]) == 1
+    verdict = judge(found)
+    assert (verdict.word, verdict.standing) == ("unexplained", NOTHING)
