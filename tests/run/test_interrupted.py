@@ -16,7 +16,7 @@ from .command import PATIENCE, Result, all_gone, contents, finish, kill, living,
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="signals and /proc as Linux has them")
 
-BLOCKS = 24
+BLOCKS = 12
 MANY_BLOCKS = ("--no-correlated-noise", "--no-remainder", "--ess", 1e6, "--max-steps", 40 * BLOCKS)
 """They stop at the budget, so that every run has as many blocks."""
 ENDLESS = (*MANY_BLOCKS[:-1], 100_000)
