@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,6 +126,5 @@ def known_effects() -> tuple[str, ...]:
 
 
 def _load_catalogue() -> None:
-    import mpam_calib.model.catalogue  # noqa: F401
-
+    import_module("mpam_calib.model.catalogue")
     load_outside_effects()

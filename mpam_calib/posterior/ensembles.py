@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.mode import evaluate
 from mpam_calib.posterior.pool import held_target
-from mpam_calib.posterior.proposal import IndependenceMove, StudentMixture
+from mpam_calib.posterior.proposal import StudentMixture, independence_move
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ def advance(task: tuple[EnsembleState, Moves, int]) -> Block:
     target = held_target()
     walkers, d = state.coords.shape
     moves = [
-        (IndependenceMove(chosen.mixture), chosen.independent),
+        (independence_move(chosen.mixture), chosen.independent),
         (DEMove(), 0.6 * (1.0 - chosen.independent)),
         (DESnookerMove(), 0.1 * (1.0 - chosen.independent)),
         (StretchMove(), 0.3 * (1.0 - chosen.independent)),

@@ -99,12 +99,11 @@ def fit_normals(x: Array, weight: Array, count: int) -> tuple[list[Array], list[
     return list(means), list(covariances), shares
 
 
-class IndependenceMove(MHMove):  # type: ignore[misc]
+def independence_move(mixture: StudentMixture) -> MHMove:
     """emcee's Metropolis-Hastings move with a proposal that does not look at where a walker is."""
 
-    def __init__(self, mixture: StudentMixture) -> None:
-        def propose(x: Array, rng: np.random.RandomState) -> tuple[Array, Array]:
-            q = mixture.draw(len(x), rng)
-            return q, mixture.log_density(x) - mixture.log_density(q)
+    def propose(x: Array, rng: np.random.RandomState) -> tuple[Array, Array]:
+        q = mixture.draw(len(x), rng)
+        return q, mixture.log_density(x) - mixture.log_density(q)
 
-        super().__init__(propose)
+    return MHMove(propose)

@@ -22,8 +22,7 @@ def data_uri(figure: Figure, format: Literal["svg", "png"] = "svg") -> str:
     import matplotlib as mpl
 
     buffer = io.BytesIO()
-    fixed: dict[str, object] = {"svg.hashsalt": "mpam-calib", "svg.fonttype": "path"}
-    with mpl.rc_context(fixed):  # type: ignore[arg-type]
+    with mpl.rc_context({"svg.hashsalt": "mpam-calib", "svg.fonttype": "path"}):
         if format == "svg":
             nameless = {"Date": None, "Creator": None, "Format": None, "Type": None}
             figure.savefig(buffer, format="svg", metadata=nameless)

@@ -6,7 +6,7 @@ A twin of ``mpam_calib.design.draws`` for tests: blocked force and free contract
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,10 +41,10 @@ class MuscleDraws:
     E_br: float
 
     @classmethod
-    def none(cls, P: float, moduli: Array, **declared: object) -> MuscleDraws:
+    def none(cls, P: float, moduli: Array, **declared: Any) -> MuscleDraws:
         """Draws with nothing but moduli: every effect is zero unless given by name."""
         zero = np.zeros(moduli.shape[0])
-        values: dict[str, object] = {
+        values: dict[str, Any] = {
             "L0": 0.05,
             "kinematics": "constant_thickness",
             "strain": "stretch",
@@ -55,7 +55,7 @@ class MuscleDraws:
             "braid_factor": zero,
             "E_br": 2.1e9,
         }
-        return cls(P=P, moduli=moduli, **(values | declared))  # type: ignore[arg-type]
+        return cls(P=P, moduli=moduli, **(values | declared))
 
     @property
     def pressure(self) -> Array:

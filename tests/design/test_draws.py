@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -24,13 +26,13 @@ F_BEST = P * np.pi * R**2 * (2.0 * ROOT * np.tan(ALPHA) ** 2 - 0.6)
 X = np.array([2.4 * MM, 0.6 * MM, 66.0 * DEG])
 
 
-def model(sd: float = 0.0, braid: Braid | None = None, **declared: object) -> Model:
+def model(sd: float = 0.0, braid: Braid | None = None, **declared: Any) -> Model:
     """A muscle of R 3 mm, t 0.7 mm, α 72°, with nothing but what is declared."""
-    told: dict[str, object] = {"effects": (), "friction": "none", "order": 2, "law": "constant"}
+    told: dict[str, Any] = {"effects": (), "friction": "none", "order": 2, "law": "constant"}
     geometry = Geometry(L0_mm=50.0, R0_mm=3.0, t0_mm=0.7, alpha0_deg=72.0, sd=GeometrySd(alpha0_deg=sd))
     return build_model(
         Blueprint(
-            simulation=Simulation(**(told | declared)),  # type: ignore[arg-type]
+            simulation=Simulation(**(told | declared)),
             geometry=geometry,
             braid=braid,
             sensors=Sensors(),

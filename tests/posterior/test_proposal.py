@@ -8,7 +8,7 @@ from emcee import EnsembleSampler, State
 from emcee.moves import MHMove
 from scipy import integrate, stats
 
-from mpam_calib.posterior.proposal import FREEDOM, IndependenceMove, StudentMixture, fit_normals
+from mpam_calib.posterior.proposal import FREEDOM, StudentMixture, fit_normals, independence_move
 
 MEANS = [np.array([0.0, 1.0]), np.array([3.0, -1.0])]
 SPREADS = [np.array([[1.0, 0.6], [0.6, 2.0]]), np.array([[0.3, -0.1], [-0.1, 0.5]])]
@@ -98,7 +98,7 @@ def p_values(x: np.ndarray) -> list[float]:
 
 
 def test_the_move_leaves_a_known_density_as_it_is():
-    assert min(p_values(ends(IndependenceMove(mixture())))) > 1e-3
+    assert min(p_values(ends(independence_move(mixture())))) > 1e-3
 
 
 def test_a_wrong_hastings_factor_does_not_pass_as_the_move():
@@ -119,7 +119,7 @@ def test_a_wrong_hastings_factor_does_not_pass_as_the_move():
 def test_the_move_finds_the_density_from_elsewhere():
     """Walkers that start far out end up as draws of the target."""
     start = TRUTH.rvs(4000, random_state=8) * 4.0 + 5.0
-    sampler = EnsembleSampler(4000, 2, TRUTH.logpdf, moves=IndependenceMove(mixture()), vectorize=True)
+    sampler = EnsembleSampler(4000, 2, TRUTH.logpdf, moves=independence_move(mixture()), vectorize=True)
     state = State(start, random_state=np.random.RandomState(9).get_state())
     x = sampler.run_mcmc(state, 150, skip_initial_state_check=True).coords
     assert min(p_values(x)) > 1e-3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -81,8 +82,8 @@ def test_any_changed_or_lost_byte_counts_as_missing(checkpoint: Checkpoint) -> N
 
 def test_a_pickle_is_never_run(checkpoint: Checkpoint, tmp_path: Path) -> None:
     class Trap:
-        def __reduce__(self) -> tuple[object, tuple[str]]:
-            return Path.touch, (tmp_path / "sprung",)  # type: ignore[return-value]
+        def __reduce__(self) -> Any:
+            return Path.touch, (tmp_path / "sprung",)
 
     checkpoint.folder.mkdir()
     (checkpoint.folder / "part.checkpoint").write_bytes(pickle.dumps(Trap()))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mpam_calib.report.figures import style
 from mpam_calib.report.view import CalibrationView
@@ -54,5 +55,5 @@ def _panel(ax: Axes, view: CalibrationView, quantity: str, colour: str, scale: f
         )  # fmt: skip
 
 
-def _points(ax: Axes, x: object, y: object) -> None:
-    ax.plot(x, y, "x", color=style.INK, markersize=4, markeredgewidth=0.9)  # type: ignore[arg-type]
+def _points(ax: Axes, x: ArrayLike, y: ArrayLike) -> None:
+    ax.plot(x, y, "x", color=style.INK, markersize=4, markeredgewidth=0.9)

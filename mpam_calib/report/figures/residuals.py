@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pandas as pd
@@ -59,7 +59,7 @@ def _panel(
         ax.axhspan(-view.noise, view.noise, color="#eceff3", linewidth=0)
     ax.axhline(0.0, color=style.GREY, linewidth=0.8)
     for level, group in rows.groupby("level_kPa", sort=True):
-        colour = colours[float(level)]  # type: ignore[arg-type]
+        colour = colours[cast(float, level)]
         kept = style.thinned(group.sort_values("contraction", kind="stable"), max(points // len(colours), 20))
         ax.plot(
             scale * kept["contraction"], kept["residual"], ".", color=colour, markersize=3.2, alpha=0.40,
