@@ -40,7 +40,9 @@ def misfit_budget(found: Search, causes: Set) -> Budget:
     worth: dict[Set, float] = {}
     for k in range(len(causes) + 1):
         for part in map(frozenset, combinations(sorted(causes), k)):
-            worth[part] = structured(problem, found.refit(part, 0))
+            own = structured(problem, found.taken_at_word(part, 0))
+            # A cause of size 0 is as good as none: no set leaves more than its parts.
+            worth[part] = min([own, *(worth[part - {e}] for e in part)])
     before = worth[frozenset()]
     shares = {}
     n = len(causes)
@@ -52,6 +54,7 @@ def misfit_budget(found: Search, causes: Set) -> Budget:
             weight = factorial(len(part)) * factorial(n - len(part) - 1) / factorial(n)
             share += weight * (worth[part] - worth[part | {e}])
         shares[e] = share / before if before > 0.0 else 0.0
+    found.refit(causes, 0)
     fitted = found.fits[causes, found.best_size(causes)]
     return Budget(
         before=float(np.sqrt(before)),

@@ -85,6 +85,7 @@ def curvature(target: Density, u: Array, top: float) -> Array:
     e = np.diag(step)
     corners = [u + si * e[i] + sj * e[j] for si, sj in ((1, 1), (-1, -1), (1, -1), (-1, 1))]
     f = evaluate(target, np.concatenate([u + e, u - e, *corners]))
+    f = np.where(np.isfinite(f), f, np.nan)  # infinite minus infinite says nothing either
     single = f[: 2 * d].reshape(2, d)
     hessian = np.diag((single.sum(axis=0) - 2.0 * top) / step**2)
     cross = f[2 * d :].reshape(4, -1)

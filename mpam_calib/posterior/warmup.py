@@ -47,17 +47,16 @@ Evaluate = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class WarmUp:
-    """States to go on from, the moves from here on, the modes met, and how good they were round by round."""
+    """States to go on from, the moves from here on, the modes met, and how good they were round by round.
+
+    ``fits`` says whether the mixture is as good as the posterior itself, and few steps will do.
+    """
 
     states: list[EnsembleState]
     moves: Moves
     modes: list[Mode]
     accepted: list[float]
-
-    @property
-    def fits(self) -> bool:
-        """Whether the mixture is as good as the posterior itself, and few steps will do."""
-        return self.moves.independent == INDEPENDENT
+    fits: bool
 
 
 def _components(modes: list[Mode]) -> tuple[list[Array], list[Array]]:
@@ -90,8 +89,9 @@ def _with_walkers(modes: list[Mode], blocks: list[Block], components: int = COMP
 
 
 def _weigh(modes: list[Mode], evaluate: Evaluate, seed: int) -> tuple[StudentMixture, list[float]]:
-    """Refit by weighted draws; the effective share of each round."""
-    mixture, shares = laplace_mixture(modes), []
+    """Refit by weighted draws: the best mixture, and the effective share of each round."""
+    mixture = best = laplace_mixture(modes)
+    shares: list[float] = []
     rng = np.random.RandomState(seed)
     for _ in range(WEIGHTED_ROUNDS):
         x = mixture.draw(WEIGHTED_DRAWS, rng)
@@ -100,10 +100,13 @@ def _weigh(modes: list[Mode], evaluate: Evaluate, seed: int) -> tuple[StudentMix
         weight /= weight.sum()
         effective = 1.0 / float(np.sum(weight**2))
         shares.append(effective / WEIGHTED_DRAWS)
+        # A refit to draws that few weights rule can be worse than what it was drawn from.
+        if shares[-1] == max(shares):
+            best = mixture
         if shares[-1] >= GOOD_SHARE or effective < 5 * x.shape[1]:
             break
         mixture = _with_fit(modes, x, weight)
-    return mixture, shares
+    return best, shares
 
 
 def _climb_again(target: Collapsed, blocks: list[Block], modes: list[Mode]) -> list[Mode]:
@@ -136,7 +139,7 @@ def warm_up(
         # Walkers that hardly moved are still their wide starts.
         if accepted[-1] >= ENOUGH:
             mixture = _with_walkers(modes, blocks)
-        return WarmUp([block.state for block in blocks], Moves(mixture, INDEPENDENT), modes, accepted)
+        return WarmUp([block.state for block in blocks], Moves(mixture, INDEPENDENT), modes, accepted, True)
     for number in range(ROUNDS):
         blocks = run(states, Moves(mixture, EXPLORING), EXPLORED)
         states = [block.state for block in blocks]
@@ -145,7 +148,7 @@ def warm_up(
         if number > 0:
             modes = _climb_again(target, blocks, modes)
             mixture = _with_walkers(modes, blocks, MORE_COMPONENTS)
-    return WarmUp(states, Moves(mixture, SHARED), modes, accepted)
+    return WarmUp(states, Moves(mixture, SHARED), modes, accepted, False)
 
 
 def _accepted(blocks: list[Block]) -> float:
