@@ -1,0 +1,58 @@
+"""The misfit budget: every share a part of the misfit, whatever was doubted or where a climb ended."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from criticism.test_hypotheses import problem_of, specimen_of
+from mpam_calib.criticism.budget import misfit_budget
+from mpam_calib.criticism.problem import SIZES
+from mpam_calib.criticism.search import Search
+from mpam_calib.criticism.spread import Alone
+
+CAUSES = frozenset(["coulomb_friction", "dead_band"])
+CASE = "develop-separable-016"
+"""Both are hidden in it, with tensile moduli."""
+
+
+@pytest.fixture(scope="module")
+def found() -> Search:
+    problem = problem_of(specimen_of(CASE))
+    search = Search(problem, tuple(CAUSES), Alone(problem))
+    parts = [frozenset[str](), *(frozenset([e]) for e in CAUSES), CAUSES]
+    search.refit_all((part, size) for part in parts for size in range(len(SIZES)))
+    return search
+
+
+def doubted(search: Search) -> Search:
+    """The same, in the state after the doubt."""
+    fresh = replace(search, fits=dict(search.fits))
+    fresh.doubt()
+    return fresh
+
+
+def test_shares_add_up_to_what_the_causes_explain(found: Search) -> None:
+    budget = misfit_budget(doubted(found), CAUSES)
+    assert all(share > 0.02 for share in budget.shares.values())
+    explained = 1.0 - (budget.after / budget.before) ** 2
+    assert sum(budget.shares.values()) == pytest.approx(explained, abs=1e-9)
+    assert explained > 0.9
+
+
+def test_a_doubted_fit_that_leaves_its_force_to_the_doubt_takes_no_newton_from_a_cause(found: Search) -> None:
+    search = doubted(found)
+    for e in CAUSES:
+        key = (frozenset([e]), 0)
+        search.fits[key] = replace(search.fits[key], force=2.0 * search.fits[key].force)
+    assert misfit_budget(search, CAUSES) == misfit_budget(doubted(found), CAUSES)
+
+
+def test_a_climb_that_ended_badly_gives_no_negative_share(found: Search) -> None:
+    search = doubted(found)
+    key = (frozenset(["dead_band"]), 0)
+    search.searched[key] = replace(search.searched[key], force=2.0 * search.searched[key].force)
+    shares = misfit_budget(search, CAUSES).shares
+    assert min(shares.values()) >= 0.0
+    assert sum(shares.values()) <= 1.0 + 1e-9
