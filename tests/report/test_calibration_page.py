@@ -185,6 +185,16 @@ def test_density_is_that_of_a_normal() -> None:
     assert np.trapezoid(found, x) == pytest.approx(1.0, abs=0.01)
 
 
+def test_density_shows_something_of_draws_over_many_decades() -> None:
+    """An unidentified coefficient's few largest draws must not empty the picture of the others."""
+    draws = np.random.default_rng(3).standard_cauchy(4000) ** 9
+    low, high = np.quantile(draws, [0.002, 0.998])
+    x = np.linspace(low, high, 120)
+    found = density.density(draws, x)
+    assert found.max() > 0.0
+    assert np.trapezoid(found, x) == pytest.approx(1.0, abs=0.05)
+
+
 def test_mass_levels_hold_their_mass() -> None:
     rng = np.random.default_rng(2)
     _, _, height = density.joint_density(*rng.normal(size=(2, 20_000)))

@@ -16,14 +16,16 @@ def spans(draws: Floats) -> bool:
 def density(draws: Floats, at: Floats) -> Floats:
     """Gaussian kernel density of the draws, shape (draws,), at points of shape (points,).
 
-    Bandwidth by Silverman's rule on the smaller of sd and scaled interquartile range.
+    Bandwidth by Silverman's rule on the smaller of sd and scaled interquartile range; where a few draws
+    reach decades further, no finer than the points can show.
     """
     x = draws[np.isfinite(draws)]
     q25, q75 = np.quantile(x, [0.25, 0.75])
     scale = min(float(x.std()), float(q75 - q25) / 1.349) or float(x.std())
-    h = 0.9 * scale * len(x) ** -0.2
+    h = max(0.9 * scale * len(x) ** -0.2, float(np.ptp(at)) / len(at))
     # a histogram much finer than the bandwidth stands in for the draws: cost no longer grows with them
-    edges = np.linspace(x.min() - 4 * h, x.max() + 4 * h, 513)
+    low, high = max(float(x.min()), float(at.min())), min(float(x.max()), float(at.max()))
+    edges = np.linspace(low - 4 * h, high + 4 * h, 513)
     counts = np.histogram(x, edges)[0]
     centres = 0.5 * (edges[1:] + edges[:-1])
     filled = counts > 0
