@@ -22,8 +22,9 @@ from mpam_calib.model.readings import Readings
 
 Array = NDArray[np.float64]
 
-DOUBTS = (0.02, 0.06)
-"""Prior sds of a share of an effect's force that its equation gets wrong along one smooth function."""
+DOUBTS = (0.0, 0.02, 0.06)
+"""Prior sds of a share of an effect's force that its equation gets wrong along one smooth function; 0 takes
+the equations at their word."""
 DEGREE = 3
 PLACE = ("contraction", "pressure")
 """Drivers that every effect may depend on, and jointly."""

@@ -90,14 +90,18 @@ def fit(
     climb = Climb(problem, chain, size, np.empty((n, 0)))
     u = np.array([(start or {}).get(name, 0.0) for name in climb.names], dtype=np.float64)
     place = climb.climb(u, climb.guide(), np.zeros(chain.linear_size))
+    plain = _fitted(effects, climb, place, 0.0)
     if not effects or not doubts:
-        return _fitted(effects, climb, place, 0.0)
+        return plain
     # A doubt is in proportion to the sizes found so far; with it they settle once more.
     readings, first, second = problem.lean
     columns = doubt_columns(key, effects, climb.values(place.u[None]), place.eta, readings, place.guide)
     columns = 0.5 * (columns[first] + columns[second])
     found = []
     for doubt in doubts:
+        if doubt == 0.0:
+            found.append(plain)
+            continue
         climb = Climb(problem, chain, size, doubt * columns)
         place = climb.climb(place.u, place.guide, place.eta[: chain.linear_size])
         found.append(_fitted(effects, climb, place, doubt))

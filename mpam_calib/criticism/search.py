@@ -29,7 +29,7 @@ Set = frozenset[str]
 Try = tuple[tuple[str, ...], dict[str, float]]
 """Forms of the effects, and coordinates to start from."""
 
-RATE = 0.01
+RATE = 0.001
 """Prior odds of one more cause: a passenger must not come close to the set that it rides on."""
 WIDTH = 6
 """Sets of each size that are extended further."""

@@ -11,7 +11,7 @@ from mpam_calib.criticism.doubt import DOUBTS
 from mpam_calib.criticism.fit import Fit, chain_for, doubt_columns, fit
 from mpam_calib.criticism.problem import Problem
 
-DOUBT = DOUBTS[1]
+DOUBT = max(DOUBTS)
 CAUSE, SIZE = "length_offset", 0.3
 """The hidden cause and its size in prior sds."""
 PASSENGER = "braid_angle"
@@ -60,14 +60,16 @@ def test_a_passenger_that_mends_a_form_loses_its_lead(problem: Problem) -> None:
     plain, doubted = lead_of_passenger(made, ()), lead_of_passenger(made, DOUBTS)
     assert plain > 5.0
     assert doubted < -2.0
+    found = fit(made, frozenset([f"{CAUSE}:bent"]), 0, {"offset_mm": SIZE}, doubts=DOUBTS)
+    assert found.doubt_sd > 0.0 and found.doubt.any()
 
 
 def test_where_the_form_holds_nothing_is_doubted_away(problem: Problem) -> None:
-    """Where the equation is the real one, no passenger gains, and the doubt stays small beside the cause."""
+    """Where the equation is the real one, no passenger gains, and the equation is taken at its word."""
     made = with_cause(problem, 0.0)
     assert lead_of_passenger(made, DOUBTS) < -2.0
     found = fit(made, frozenset([CAUSE]), 0, {"offset_mm": SIZE}, doubts=DOUBTS)
-    assert 0.0 < float(np.mean(found.doubt**2)) < DOUBT**2 * float(np.mean(share(problem) ** 2))
+    assert found.doubt_sd == 0.0 and not found.doubt.any()
     assert found.u[found.names.index("offset_mm")] == pytest.approx(SIZE, abs=0.1 * SIZE)
 
 
