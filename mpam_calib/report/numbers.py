@@ -25,6 +25,17 @@ def decimals(uncertainty: float) -> int:
     return -exponent + (1 if leading < 3.0 or exponent > 0 else 0)
 
 
+def probability(p: float) -> str:
+    """A probability that is never said to be certain.
+
+    >>> probability(1.0), probability(0.9712), probability(2e-9)
+    ('> 0.999', '0.971', '< 0.001')
+    """
+    if p > 0.999:
+        return "> 0.999"
+    return "< 0.001" if p < 0.001 else f"{p:.3g}"
+
+
 def with_band(mean: float, low: float, high: float) -> tuple[str, str]:
     """Value and band "low–high", with the decimals that half the band supports.
 
