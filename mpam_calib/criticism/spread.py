@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Protocol, TypeVar
 
 from mpam_calib.criticism.problem import Problem
+from mpam_calib.errors import Interrupted
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -26,7 +28,10 @@ class Spread(Protocol):
 
 @contextmanager
 def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
-    """Forked workers that hold the problem; with one worker everything stays in this process."""
+    """Forked workers that hold the problem; with one worker everything stays in this process.
+
+    Raises ``Interrupted`` where a worker is killed.
+    """
     # What all need is there before anyone is forked.
     assert len(problem.axes[1]) == len(problem.bow) == len(problem.spreads[0]) == problem.root.shape[0]
     assert problem.log_dets
@@ -38,10 +43,13 @@ def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
         finally:
             _hold(before)
         return
-    with ProcessPoolExecutor(
-        workers, mp_context=get_context("fork"), initializer=_hold, initargs=(problem,)
-    ) as pool:
-        yield lambda function, tasks, chunk=1: pool.map(function, tasks, chunksize=chunk)
+    try:
+        with ProcessPoolExecutor(
+            workers, mp_context=get_context("fork"), initializer=_hold, initargs=(problem,)
+        ) as pool:
+            yield lambda function, tasks, chunk=1: pool.map(function, tasks, chunksize=chunk)
+    except BrokenProcessPool as error:
+        raise Interrupted("interrupted: a worker process was killed (for want of memory?)") from error
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,7 @@ def _structured(target: Collapsed, u: Array) -> Array:
 def climb_modes(target: Collapsed, starts: list[Array]) -> list[Mode]:
     """Distinct modes that climbs from the starts lead to, best first."""
     with workers(target, len(starts)) as pool:
-        ends = pool.map(_climb_held, starts, chunksize=1)
+        ends = pool.map(_climb_held, starts)
     found: list[Mode] = []
     for u, top in sorted(ends, key=lambda end: -end[1]):
         if found and found[0].log_posterior - top > HOPELESS:

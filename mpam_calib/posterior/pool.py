@@ -8,12 +8,15 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing.pool import Pool
-from typing import TypeVar
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from mpam_calib.errors import Interrupted
 from mpam_calib.posterior.collapsed import Collapsed
 
 Task = TypeVar("Task")
@@ -51,17 +54,41 @@ def _keep_freed_memory() -> None:
     mallopt(trim_threshold, 1 << 30)
 
 
-class Inline:
-    """What stands for a pool inside another pool's worker, which may have no processes of its own."""
+class Workers(Protocol):
+    """Processes that hold the target."""
 
-    def map(self, work: Callable[[Task], Found], tasks: Iterable[Task], chunksize: int = 1) -> list[Found]:
+    def map(self, work: Callable[[Task], Found], tasks: Iterable[Task]) -> list[Found]:
+        """The results in the tasks' order."""
+
+
+class Inline:
+    """What stands for processes inside another pool's worker, which may have none of its own."""
+
+    def map(self, work: Callable[[Task], Found], tasks: Iterable[Task]) -> list[Found]:
         """One task after the other, here."""
         return [work(task) for task in tasks]
 
 
+@dataclass(frozen=True)
+class Processes:
+    """Processes of our own; one that is killed ends the computation instead of being waited for."""
+
+    executor: ProcessPoolExecutor
+
+    def map(self, work: Callable[[Task], Found], tasks: Iterable[Task]) -> list[Found]:
+        """All tasks at once; raises ``Interrupted`` where a process is killed."""
+        try:
+            return list(self.executor.map(work, tasks))
+        except BrokenProcessPool as error:
+            raise Interrupted(
+                "interrupted: a worker process was killed (for want of memory?); what was drawn is kept, the "
+                "same command goes on from it"
+            ) from error
+
+
 @contextmanager
-def workers(target: Collapsed, wanted: int) -> Iterator[Pool | Inline]:
-    """A pool of at most ``wanted`` workers that hold the target."""
+def workers(target: Collapsed, wanted: int) -> Iterator[Workers]:
+    """At most ``wanted`` workers that hold the target."""
     global _TARGET
     if multiprocessing.current_process().daemon:
         before, _TARGET = _TARGET, target
@@ -72,5 +99,13 @@ def workers(target: Collapsed, wanted: int) -> Iterator[Pool | Inline]:
         return
     method = "fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn"
     count = max(1, min(wanted, os.cpu_count() or 1))
-    with multiprocessing.get_context(method).Pool(count, initializer=_adopt, initargs=(target,)) as pool:
-        yield pool
+    others = set(multiprocessing.active_children())
+    context = multiprocessing.get_context(method)
+    with ProcessPoolExecutor(count, mp_context=context, initializer=_adopt, initargs=(target,)) as executor:
+        try:
+            yield Processes(executor)
+        except BaseException:
+            # Nobody waits for what they are at.
+            for child in set(multiprocessing.active_children()) - others:
+                child.kill()
+            raise

@@ -86,7 +86,7 @@ def sample(
     with workers(target, ENSEMBLES) as pool:
 
         def run(states: list[EnsembleState], moves: Moves, steps: int) -> list[Block]:
-            return pool.map(advance, [(state, moves, steps) for state in states], chunksize=1)
+            return pool.map(advance, [(state, moves, steps) for state in states])
 
         warm: WarmUp | None = checkpoint.load("warm_up") if checkpoint else None
         if warm is None:

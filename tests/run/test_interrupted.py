@@ -94,6 +94,22 @@ def test_a_run_killed_at_any_moment_is_resumed(
     resume(muscle, folder, whole)
 
 
+def test_a_killed_worker_ends_the_run_and_loses_nothing(
+    muscle: Path, tmp_path: Path, unbroken: tuple[dict[str, bytes], float]
+) -> None:
+    """As the kernel does where memory runs out: nobody waits for what will never come."""
+    folder = tmp_path / "run"
+    process = start("calibrate", muscle, "-o", folder, *ENDLESS)
+    assert wait_for(process, _parts(folder)[1])
+    worker = next(pid for pid in living(process.pid) if pid != process.pid)
+    os.kill(worker, signal.SIGKILL)
+    result = finish(process)
+    assert result.code == 130, result
+    assert result.complaint.startswith("interrupted: a worker process was killed")
+    assert all_gone(process.pid, PATIENCE)
+    resume(muscle, folder, unbroken[0])
+
+
 @pytest.mark.parametrize("delay", [0.4, 1.5])
 def test_ctrl_c_at_an_early_moment_says_one_line(delay: float, muscle: Path, tmp_path: Path) -> None:
     result = _interrupt(muscle, tmp_path / "run", delay)

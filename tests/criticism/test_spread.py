@@ -1,0 +1,29 @@
+"""Workers that hold a problem: one that is killed is not waited for."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import pytest
+from rig import sets
+
+from criticism.test_hypotheses import problem_of, specimen_of
+from mpam_calib.criticism.spread import held_problem, spread_over
+from mpam_calib.errors import Interrupted
+
+
+def rows_held(number: int) -> int:
+    """Rows of the problem that this process holds; a process that is given 0 dies as for want of memory."""
+    if number == 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return len(held_problem()) * number
+
+
+def test_a_killed_worker_ends_the_work() -> None:
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null")
+    problem = problem_of(specimen_of(recipe.name))
+    with spread_over(problem, 2) as spread:
+        assert list(spread(rows_held, [1, 2, 3])) == [len(problem) * k for k in (1, 2, 3)]
+    with pytest.raises(Interrupted, match="killed"), spread_over(problem, 2) as spread:
+        list(spread(rows_held, [0, 1, 2]))
