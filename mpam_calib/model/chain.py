@@ -29,9 +29,11 @@ from mpam_calib.physics.statics import gas_force, modulus_columns, thickness_for
 
 Array = NDArray[np.float64]
 
-FIXED_POINT_STEPS = 12
+FIXED_POINT_STEPS = 30
 FIXED_POINT_TOLERANCE = 1e-6
-"""Newtons between two rounds of the force's fixed point."""
+"""Newtons between a force that depends on itself and what it was computed from."""
+SLOPES = (-1e3, 0.9)
+"""Slopes of such a force that are believed."""
 
 
 class Terms(NamedTuple):
@@ -110,20 +112,33 @@ class Chain:
         return slope * fixed + self._strand_force(state) + state.zero, slope, columns
 
     def force(self, values: Values, eta: Array, readings: Readings) -> Array:
-        """Force (B, n), N, for coordinates η (B, p): exact, by fixed point where effects need the force."""
+        """Force (B, n), N, for coordinates η (B, p): exact; by secants where it depends on itself."""
         guide = np.zeros((1, len(readings)))
-        for _ in range(FIXED_POINT_STEPS if self.uses_force else 1):
-            state, shape = self._to_shape(values, readings, guide)
-            fixed, columns = self._statics(state, shape, values)
-            free = fixed + np.einsum("...np,...p->...n", columns, eta) if columns.shape[-1] else fixed
-            state = self._to_sensor(state, values)
-            free = state.gain * free
-            friction = state.friction_gain * state.coulomb * np.abs(free) * state.sign
-            force: Array = free + friction + self._strand_force(state) + state.zero
-            if np.max(np.abs(force - guide), initial=0.0) < FIXED_POINT_TOLERANCE:
+        force = self._force_given(guide, values, eta, readings)
+        before: tuple[Array, Array] | None = None
+        for _ in range(FIXED_POINT_STEPS if self.uses_force else 0):
+            gap = force - guide
+            if np.max(np.abs(gap), initial=0.0) < FIXED_POINT_TOLERANCE:
                 break
-            guide = force
+            slope = np.zeros(1)
+            if before is not None:
+                step = guide - before[0]
+                safe = np.where(np.abs(step) > FIXED_POINT_TOLERANCE, step, 1.0)
+                slope = np.where(safe == step, np.clip((force - before[1]) / safe, *SLOPES), 0.0)
+            before = (guide, force)
+            guide = guide + gap / (1.0 - slope)
+            force = self._force_given(guide, values, eta, readings)
         return force
+
+    def _force_given(self, guide: Array, values: Values, eta: Array, readings: Readings) -> Array:
+        """Force (B, n), N, where what depends on the force is fed with a guide (B or 1, n)."""
+        state, shape = self._to_shape(values, readings, guide)
+        fixed, columns = self._statics(state, shape, values)
+        free = fixed + np.einsum("...np,...p->...n", columns, eta) if columns.shape[-1] else fixed
+        state = self._to_sensor(state, values)
+        free = state.gain * free
+        friction = state.friction_gain * state.coulomb * np.abs(free) * state.sign
+        return np.asarray(free + friction + self._strand_force(state) + state.zero)
 
     def _to_shape(self, values: Values, readings: Readings, guide: Array) -> tuple[State, Shape]:
         state = self.start(readings, guide)

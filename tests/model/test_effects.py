@@ -195,6 +195,21 @@ def test_an_effect_is_the_rig_s_textbook_form(identifier):
     assert np.max(np.abs(expected - force_of(muscle, rows))) > 1e3 * tolerance
 
 
+@pytest.mark.parametrize("times", [1.0, 10.0])
+def test_a_soft_fixture_is_in_balance_with_the_muscle(times):
+    """The force at a reading is that of the muscle as much shorter as the fixture gives."""
+    rows = record_rows(PROTOCOL, MUSCLE, 1)
+    values = declared_values(MUSCLE)
+    compliance = times * SIZES["rig_compliance"] * si_factor("compliance_mm_per_N")
+    values["compliance_mm_per_N"] = np.array([[compliance]])
+    readings = readings_of(rows)
+    found = chain_with(MUSCLE, rows, ("rig_compliance",)).force(values, np.zeros((1, 1)), readings)[0]
+    shorter = replace(readings, displacement=readings.displacement + compliance * found)
+    bare = chain_with(MUSCLE, rows, ()).force(values, np.zeros((1, 1)), shorter)[0]
+    assert bare == pytest.approx(found, abs=1e-4)
+    assert np.abs(compliance * found).max() > 1e-5 * times
+
+
 def test_terms_and_force_agree_with_the_right_guide():
     """The linear part given the force's own sign and size is the exact force, fixture included.
 
