@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 from mpam_calib.criticism.noise_level import NoiseLevel, noise_level
-from mpam_calib.criticism.rows import Rows, saturated, without
+from mpam_calib.criticism.rows import Rows, saturated, telling_points, telling_strokes, without
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.noise import grown
@@ -247,8 +247,10 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     if loops is not None:
         out = saturated(loops)
         loops, beyond = without(loops, out), float(out.mean())
-        strokes = len(np.unique(loops.stroke))
-        bins = bin_loops(loops, int(np.clip(ROWS // strokes, 8, 32)))
+        looked_at = telling_strokes(loops)
+        bins = bin_loops(loops, int(np.clip(ROWS // len(looked_at), 8, 32)))
+        n = len(bins)
+        keep = np.flatnonzero(~bins.slack & np.isin(bins.segment, looked_at))
         noise = noise_level(loops, model)
         if noise is None:
             guess = model.setting.force_sd or _from_differences(bins.force, bins.segment)
@@ -256,21 +258,18 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         layout = StrokeCovariance.build(bins)
         white, correlated, time = (np.array([v]) for v in (noise.white, noise.correlated, noise.time))
         padded = layout.matrix(white, correlated, time, np.zeros(1))[0][layout.kind]
-        full = np.zeros((len(bins), len(bins)))
-        for segment in range(bins.segments):
-            rows = np.flatnonzero(bins.segment == segment)
-            at = bins.position[rows]
+        full = np.zeros((len(keep), len(keep)))
+        for segment in looked_at:
+            rows = np.flatnonzero(bins.segment[keep] == segment)
+            at = bins.position[keep[rows]]
             full[np.ix_(rows, rows)] = padded[segment][np.ix_(at, at)]
-        larger = grown(np.array(noise.growth), bins.force, scale)
-        full = larger[:, None] * larger * full + _held(bins)
-        keep = np.flatnonzero(~bins.slack)
-        n = len(bins)
+        larger = grown(np.array(noise.growth), bins.force[keep], scale)
         low, high = bins.readings.take(keep), bins.readings.take(keep + n)
         parts.append((low, high, bins.force[keep], bins.segment[keep], np.zeros(0)))
-        blocks.append(full[np.ix_(keep, keep)])
+        blocks.append(larger[:, None] * larger * full + _held(bins, keep))
     points = gather_points(specimen)
     if points is not None:
-        keep = np.flatnonzero(~points.censored & (points.kind < 2))
+        keep = telling_points(np.flatnonzero(~points.censored & (points.kind < 2)), points.readings.pressure)
         sd = noise.total if noise else model.setting.force_sd or FORCE_MAP_NOISE * scale
         noise = noise or NoiseLevel(sd, 0.0, 1.0)
         rows_of = points.readings.take(keep)
@@ -300,8 +299,8 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     return replace(problem, kernel=_kernel(problem))
 
 
-def _held(bins: LoopBins) -> Array:
-    """What bins at rest may be off by (covariance, N²): their level's friction, much the same in all strokes.
+def _held(bins: LoopBins, keep: Ints) -> Array:
+    """What these bins may be off by at rest (covariance, N²): their level's friction, alike in all strokes.
 
     Where the crosshead stops for a while, friction holds, fades or creeps; no model of sliding knows which.
     """
@@ -317,7 +316,8 @@ def _held(bins: LoopBins) -> Array:
         half = 0.5 * (force[up] - np.interp(x[up], x[down], force[down]))
         friction = np.polynomial.Polynomial.fit(x[up], half, 1)(x)
         doubt[here] = (sign * friction * bins.rest)[here]
-    alike = np.where(bins.segment[:, None] == bins.segment, 1.0, ALIKE)
+    doubt, sign, segment = doubt[keep], sign[keep], bins.segment[keep]
+    alike = np.where(segment[:, None] == segment, 1.0, ALIKE)
     result: Array = doubt[:, None] * doubt * alike * (sign[:, None] == sign)
     return result
 

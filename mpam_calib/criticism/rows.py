@@ -23,6 +23,9 @@ OUTSTANDING = 8.0
 """... and so many times as many as at the next values (a coarse converter repeats all of them)."""
 NEXT = 5
 
+MOST_STROKES, MOST_POINTS = 90, 600
+"""Strokes, and static readings, that are looked at: what a search costs grows with their cube."""
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -64,3 +67,34 @@ def without(loops: Loops, rows: NDArray[np.bool_]) -> Loops:
         if isinstance(value := getattr(loops, f.name), np.ndarray) and len(value) == len(rows)
     }
     return replace(loops, **arrays)
+
+
+def telling_strokes(loops: Loops) -> Ints:
+    """The strokes that are looked at, as indices in the order of the loops.
+
+    All of them, or of each level's cycles the first, the last and some between, closer together in the
+    beginning: what happens to a muscle with the cycles happens in the first ones.
+    """
+    first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
+    if len(first) <= MOST_STROKES:
+        return np.arange(len(first))
+    level, cycle = loops.level[first], loops.cycle[first]
+    chosen = np.zeros(len(first), dtype=bool)
+    for here in (level == one for one in np.unique(level)):
+        cycles = np.unique(cycle[here])
+        count = max(2, len(cycles) * MOST_STROKES // len(first))
+        places = np.round(np.geomspace(1, len(cycles), count)).astype(np.int64)
+        chosen |= here & np.isin(cycle, cycles[places - 1])
+    return np.flatnonzero(chosen)
+
+
+def telling_points(points: Ints, pressure: Array) -> Ints:
+    """The static readings that are looked at: all of ``points``, or as many evenly along the pressure.
+
+    ``pressure`` (Pa) is that of all readings.
+    """
+    if len(points) <= MOST_POINTS:
+        return points
+    ordered = points[np.argsort(pressure[points], kind="stable")]
+    places = np.round(np.linspace(0, len(points) - 1, MOST_POINTS)).astype(np.int64)
+    return np.sort(ordered[places])

@@ -63,7 +63,7 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
             ]
         ),
     ]
-    lead += [Notice(text) for text in wording.noise_left_aside(specimen, "search")]
+    lead += [Notice(text) for text in wording.left_aside(specimen, "search")]
     sections = [
         Section("Misfit budget", _budget(found, content)),
         Section("Where the misfit shows", _structure(content)),

@@ -7,7 +7,7 @@ import pandas as pd
 from mpam_calib.criticism.select import Selection
 from mpam_calib.report.choices import choices_section
 from mpam_calib.report.page import Block, DataTable, Headline, Notice, Page, Section, Text, Verdict
-from mpam_calib.report.wording import noise_left_aside
+from mpam_calib.report.wording import left_aside
 from mpam_calib.specimen.recording import Specimen
 
 SHOWN = 20
@@ -40,7 +40,7 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
         Headline(sentence),
         Verdict("Model selection", "good" if sure else "caution", reasons),
     ]
-    lead += [Notice(text) for text in noise_left_aside(specimen, "ranking")]
+    lead += [Notice(text) for text in left_aside(specimen, "ranking")]
     names = [short_name(models.iloc[i]) for i in range(len(found.confusion))]
     ranks = {
         "log_evidence": "{:.2f}", "log_evidence_se": "{:.2g}", "probability": "{:.3g}",

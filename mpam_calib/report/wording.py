@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from mpam_calib.criticism.rows import MOST_POINTS, telling_strokes
 from mpam_calib.report.trust import ESS_LIMIT, RHAT_LIMIT
 from mpam_calib.report.view import Convergence
 from mpam_calib.specimen.declaration import Simulation
@@ -53,9 +56,18 @@ def material_sentence(simulation: Simulation) -> str:
     return f"The law: stress is a polynomial of order {simulation.order} in {_MEASURE[simulation.strain]}."
 
 
-def noise_left_aside(specimen: Specimen, what: str) -> list[str]:
-    """What the declaration says of the noise and this ``what`` (ranking, search) does not use."""
+def left_aside(specimen: Specimen, what: str) -> list[str]:
+    """What was recorded, or declared of the noise, and this ``what`` (ranking, search) does not use."""
     found = []
+    if specimen.loops is not None:
+        used, strokes = len(telling_strokes(specimen.loops)), len(np.unique(specimen.loops.stroke))
+        if used < strokes:
+            found.append(
+                f"This {what} looks at {used} of {strokes} strokes: of each level's cycles the first, the "
+                "last and some between."
+            )
+    if specimen.force_map is not None and len(specimen.force_map.force_N) > MOST_POINTS:
+        found.append(f"This {what} looks at {MOST_POINTS} static readings, evenly along the pressure.")
     if specimen.noise.robust:
         found.append(
             f"Heavy tails of the noise ([noise] robust) are not part of this {what}: bursts are left out "

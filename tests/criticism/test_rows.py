@@ -1,0 +1,70 @@
+"""Which of very many recordings a search looks at."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rig import case as rig_case
+from rig import recipes, sets
+
+from criticism.test_hypotheses import problem_of
+from mpam_calib.criticism import rows
+from mpam_calib.report.wording import left_aside
+from mpam_calib.specimen import Specimen, read
+
+CYCLES = 40
+
+
+@pytest.fixture(scope="module")
+def durable() -> Specimen:
+    """Two levels with forty cycles each."""
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
+    recipe = replace(
+        recipe, levels=2, cycles=CYCLES, speeds=1, rows_max=6000, dwell=False, motion="triangle", floor=False
+    )
+    folder = Path(tempfile.mkdtemp())
+    rig_case.write_case(recipes.build_case(recipe), folder / "specimen", folder / "truth.json")
+    return read(folder / "specimen")
+
+
+def test_of_many_cycles_the_first_and_the_last_are_looked_at(durable: Specimen) -> None:
+    problem = problem_of(durable)
+    for level in np.unique(problem.level):
+        cycles = np.unique(problem.cycle[problem.level == level])
+        assert {1, 2, CYCLES} <= set(cycles.tolist())
+        assert len(cycles) < CYCLES / 1.5
+    assert len(np.unique(problem.stroke)) <= rows.MOST_STROKES
+    (said,) = left_aside(durable, "search")
+    assert f"of {4 * CYCLES} strokes" in said
+
+
+def test_what_is_looked_at_is_as_it_was(durable: Specimen, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time at the level, way since the turn and noise know of the cycles that are left out."""
+    some = problem_of(durable)
+    monkeypatch.setattr(rows, "MOST_STROKES", 10 * CYCLES)
+    every = problem_of(durable)
+    kept = np.isin(every.stroke, some.stroke)
+    assert kept.sum() == len(some) < len(every)
+    np.testing.assert_array_equal(every.force[kept], some.force)
+    np.testing.assert_allclose(every.noise[np.ix_(kept, kept)], some.noise, rtol=1e-12)
+    both = np.concatenate([kept, kept])
+    for name in ("travel", "reversal", "time_at_level", "displacement", "cycle", "speed"):
+        np.testing.assert_array_equal(getattr(every.readings, name)[both], getattr(some.readings, name))
+
+
+def test_few_are_all_looked_at() -> None:
+    points = np.arange(5, rows.MOST_POINTS)
+    np.testing.assert_array_equal(rows.telling_points(points, np.zeros(1000)), points)
+
+
+def test_of_many_static_readings_every_pressure_is_looked_at() -> None:
+    pressure = np.tile(np.linspace(1e5, 5e5, 9), 300)
+    found = rows.telling_points(np.arange(len(pressure)), pressure)
+    assert len(found) == rows.MOST_POINTS
+    counts = np.unique(pressure[found], return_counts=True)[1]
+    assert len(counts) == 9
+    assert counts.max() - counts.min() <= 2
