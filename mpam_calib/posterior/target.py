@@ -47,7 +47,15 @@ def build_target(specimen: Specimen, blueprint: Blueprint) -> Collapsed:
         tensile=tensile,
         floor=0.0 if floor is None else floor,
     )
-    return Collapsed(model, data, Guide())
+    return Collapsed(model, data, _measured(data))
+
+
+def _measured(data: Data) -> Guide:
+    """The first estimate of the force: the measured one, which may push. What a floor hides is unknown."""
+    if data.bins is None:
+        return Guide()
+    force = np.where(data.bins.slack, np.abs(data.bins.force), data.bins.force)
+    return Guide(np.concatenate([force, force]))
 
 
 def locate(target: Collapsed, rng: np.random.Generator) -> tuple[Collapsed, list[Mode]]:
