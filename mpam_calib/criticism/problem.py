@@ -269,7 +269,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         blocks.append(larger[:, None] * larger * full + _held(bins, keep))
     points = gather_points(specimen)
     if points is not None:
-        keep = telling_points(np.flatnonzero(~points.censored & (points.kind < 2)), points.readings.pressure)
+        keep, _ = telling_points(points)
         sd = noise.total if noise else model.setting.force_sd or FORCE_MAP_NOISE * scale
         noise = noise or NoiseLevel(sd, 0.0, 1.0)
         rows_of = points.readings.take(keep)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.bins import row_readings
+from mpam_calib.posterior.points import Points
 from mpam_calib.specimen.recording import Loops
 
 Array = NDArray[np.float64]
@@ -88,13 +89,14 @@ def telling_strokes(loops: Loops) -> Ints:
     return np.flatnonzero(chosen)
 
 
-def telling_points(points: Ints, pressure: Array) -> Ints:
-    """The static readings that are looked at: all of ``points``, or as many evenly along the pressure.
+def telling_points(points: Points) -> tuple[Ints, int]:
+    """Static readings with a force: the indices of those that are looked at, and how many there are.
 
-    ``pressure`` (Pa) is that of all readings.
+    All of them, or MOST_POINTS evenly along the pressure.
     """
-    if len(points) <= MOST_POINTS:
-        return points
-    ordered = points[np.argsort(pressure[points], kind="stable")]
-    places = np.round(np.linspace(0, len(points) - 1, MOST_POINTS)).astype(np.int64)
-    return np.sort(ordered[places])
+    usable = np.flatnonzero(~points.censored & (points.kind < 2))
+    if len(usable) <= MOST_POINTS:
+        return usable, len(usable)
+    ordered = usable[np.argsort(points.readings.pressure[usable], kind="stable")]
+    places = np.round(np.linspace(0, len(usable) - 1, MOST_POINTS)).astype(np.int64)
+    return np.sort(ordered[places]), len(usable)

@@ -27,6 +27,8 @@ GUIDE_TOLERANCE = 0.02
 """Share of the noise by which a guide force may still move between rounds."""
 SITE_TOLERANCE = 0.02
 """Share of the typical noise by which that of a heavy-tailed row may still move."""
+PULL = 1e-6
+"""Newtons that are enough to say which way a force acts."""
 SLOPE_STEP = 1e-3
 """Contraction step of the slope at a free contraction."""
 
@@ -51,10 +53,10 @@ def build_target(specimen: Specimen, blueprint: Blueprint) -> Collapsed:
 
 
 def _measured(data: Data) -> Guide:
-    """The first estimate of the force: the measured one, which may push. What a floor hides is unknown."""
+    """The first estimate of the force: the measured one, which may push. What a floor hides still pulls."""
     if data.bins is None:
         return Guide()
-    force = np.where(data.bins.slack, np.abs(data.bins.force), data.bins.force)
+    force = np.where(data.bins.slack, np.maximum(data.bins.force, PULL), data.bins.force)
     return Guide(np.concatenate([force, force]))
 
 

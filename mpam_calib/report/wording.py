@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from mpam_calib.criticism.rows import MOST_POINTS, telling_strokes
+from mpam_calib.criticism.rows import telling_points, telling_strokes
+from mpam_calib.posterior.points import gather_points
 from mpam_calib.report.trust import ESS_LIMIT, RHAT_LIMIT
 from mpam_calib.report.view import Convergence
 from mpam_calib.specimen.declaration import Simulation
@@ -66,8 +67,13 @@ def left_aside(specimen: Specimen, what: str) -> list[str]:
                 f"This {what} looks at {used} of {strokes} strokes: of each level's cycles the first, the "
                 "last and some between."
             )
-    if specimen.force_map is not None and len(specimen.force_map.force_N) > MOST_POINTS:
-        found.append(f"This {what} looks at {MOST_POINTS} static readings, evenly along the pressure.")
+    if (points := gather_points(specimen)) is not None:
+        looked_at, usable = telling_points(points)
+        if len(looked_at) < usable:
+            found.append(
+                f"This {what} looks at {len(looked_at)} of {usable} static readings, evenly along the "
+                "pressure."
+            )
     if specimen.noise.robust:
         found.append(
             f"Heavy tails of the noise ([noise] robust) are not part of this {what}: bursts are left out "

@@ -13,6 +13,8 @@ from rig import recipes, sets
 
 from criticism.test_hypotheses import problem_of
 from mpam_calib.criticism import rows
+from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.points import Points
 from mpam_calib.report.wording import left_aside
 from mpam_calib.specimen import Specimen, read
 
@@ -56,15 +58,25 @@ def test_what_is_looked_at_is_as_it_was(durable: Specimen, monkeypatch: pytest.M
         np.testing.assert_array_equal(getattr(every.readings, name)[both], getattr(some.readings, name))
 
 
+def points_at(pressure: np.ndarray) -> Points:
+    """Static readings of a map; one is censored, one is a free contraction."""
+    n = len(pressure)
+    readings = Readings.at_rest(pressure, np.zeros(n))
+    kind = np.zeros(n, dtype=np.int64)
+    kind[1] = 2
+    return Points(readings, np.full(n, 10.0), np.arange(n) == 0, kind)
+
+
 def test_few_are_all_looked_at() -> None:
-    points = np.arange(5, rows.MOST_POINTS)
-    np.testing.assert_array_equal(rows.telling_points(points, np.zeros(1000)), points)
+    found, usable = rows.telling_points(points_at(np.full(rows.MOST_POINTS, 1e5)))
+    np.testing.assert_array_equal(found, np.arange(2, rows.MOST_POINTS))
+    assert usable == rows.MOST_POINTS - 2
 
 
 def test_of_many_static_readings_every_pressure_is_looked_at() -> None:
     pressure = np.tile(np.linspace(1e5, 5e5, 9), 300)
-    found = rows.telling_points(np.arange(len(pressure)), pressure)
-    assert len(found) == rows.MOST_POINTS
+    found, usable = rows.telling_points(points_at(pressure))
+    assert (len(found), usable) == (rows.MOST_POINTS, len(pressure) - 2)
     counts = np.unique(pressure[found], return_counts=True)[1]
     assert len(counts) == 9
     assert counts.max() - counts.min() <= 2
