@@ -37,7 +37,7 @@ calibrate: $(VENV)/.installed
 
 test: lint
 	$(BIN)/python -m pytest --doctest-modules mpam_calib
-	$(BIN)/python -m pytest -m "not long" --durations=15
+	$(BIN)/python -m pytest -m "not long" -n 2 --dist loadfile --durations=15
 
 test-long: $(VENV)/.installed
 	$(BIN)/python -m pytest -m long --durations=0

@@ -126,10 +126,12 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
             "held_out": gain.held_out,
             "rmse_before_N": _round(gain.rmse_before),
             "rmse_after_N": _round(gain.rmse_after),
+            "rmse_named_N": _round(gain.rmse_named),
             "elpd_gain": _round(gain.elpd_gain),
             "elpd_gain_se": _round(gain.elpd_gain_se),
             "coverage90_before": _round(gain.coverage90_before),
             "coverage90_after": _round(gain.coverage90_after),
+            "coverage90_named": _round(gain.coverage90_named),
             "folds_same_set": gain.folds_same_set,
             "folds": gain.folds,
         }

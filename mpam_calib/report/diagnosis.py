@@ -216,21 +216,30 @@ def _gain(content: dict[str, Any]) -> list[Block]:
     if gain is None:
         return [Text("Nothing is named, so there is nothing to gain.")]
     rows = [
-        {"": "held-out error (N)", "before": gain["rmse_before_N"], "after": gain["rmse_after_N"]},
         {
-            "": "coverage of 90 % bands",
-            "before": gain["coverage90_before"],
-            "after": gain["coverage90_after"],
-        },
+            "": what,
+            "before": gain[f"{key}_before{unit}"],
+            "after": gain[f"{key}_after{unit}"],
+            "with the causes named above": gain[f"{key}_named{unit}"],
+        }
+        for what, key, unit in (
+            ("held-out error (N)", "rmse", "_N"),
+            ("coverage of 90 % bands", "coverage90", ""),
+        )
     ]
     text = (
         f"Whole {gain['held_out']} groups were held out, {gain['folds']} folds, with search and fit "
-        f"repeated in each; "
+        f"repeated in each (after); "
         f"{gain['folds_same_set']} of them chose the same causes. The held-out readings are "
-        f"{gain['elpd_gain']:.4g} ± {gain['elpd_gain_se']:.3g} nats more probable with the extended model."
+        f"{gain['elpd_gain']:.4g} ± {gain['elpd_gain_se']:.3g} nats more probable with the extended model. "
+        "With fewer data a fold may recognise other causes: the last column keeps those named above, "
+        "fitted anew in every fold."
     )
-    formats = dict.fromkeys(["before", "after"], "{:.3g}")
-    return [Text(text), DataTable(pd.DataFrame(rows), "Before and after, held out", formats)]
+    table = pd.DataFrame(rows)
+    return [
+        Text(text),
+        DataTable(table, "Before and after, held out", dict.fromkeys(table.columns[1:], "{:.3g}")),
+    ]
 
 
 def _not_tested(content: dict[str, Any]) -> list[Block]:

@@ -1,9 +1,10 @@
 """What naming the causes gains, beside an oracle: in tests/, ``python -m criticism.gains locked 30``.
 
 For the first cases (by seed) of a set whose verdict reports causes: root mean square error of the extended
-model on levels or cycles held out (search, verdict and fit repeated in every fold), beside that of the rig's
-own model with the true forms refitted to the same folds; and the coverage of the 90 % bands. Both errors are
-against the same reduced rows. Every case is one line of ``reports/gains_<set>.csv``; a second run goes on.
+model on levels or cycles held out (``after``: search, verdict and fit repeated in every fold; ``named``: the
+causes that all rows name, refitted in every fold), beside that of the rig's own model with the true forms
+refitted to the same folds; and the coverage of the 90 % bands. All errors are against the same reduced rows.
+Every case is one line of ``reports/gains_<set>.csv``; a second run goes on.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
 
 FIELDS = [
-    "name", "word", "causes", "held_out", "rmse_before_N", "rmse_after_N", "rmse_oracle_N",
-    "coverage90_before", "coverage90_after", "folds_same_set", "folds",
+    "name", "word", "causes", "held_out", "rmse_before_N", "rmse_after_N", "rmse_named_N",
+    "rmse_oracle_N", "coverage90_before", "coverage90_after", "coverage90_named", "folds_same_set", "folds",
 ]  # fmt: skip
 
 
@@ -80,8 +81,8 @@ def measure(recipe: recipes.Recipe) -> list[str] | None:
     oracle = oracle_rmse(rig_case.record(one), specimen, problem, by_cycle)
     return [
         recipe.name, verdict.word, "+".join(sorted(verdict.standing)), gain.held_out,
-        *(f"{x:.4f}" for x in (gain.rmse_before, gain.rmse_after, oracle)),
-        f"{gain.coverage90_before:.3f}", f"{gain.coverage90_after:.3f}",
+        *(f"{x:.4f}" for x in (gain.rmse_before, gain.rmse_after, gain.rmse_named, oracle)),
+        *(f"{x:.3f}" for x in (gain.coverage90_before, gain.coverage90_after, gain.coverage90_named)),
         str(gain.folds_same_set), str(gain.folds),
     ]  # fmt: skip
 
@@ -103,12 +104,15 @@ def main(which: str, count: int, workers: int = 2) -> None:
                 writer.writerow(line)
                 file.flush()
     rows = list(csv.DictReader(path.open()))
-    ratio = np.array([float(r["rmse_after_N"]) / float(r["rmse_oracle_N"]) for r in rows])
-    for label in ("before", "after"):
+    for label in ("before", "after", "named"):
         cover = np.array([float(r[f"coverage90_{label}"]) for r in rows])
         print(f"coverage of 90 % bands {label}: median {np.median(cover):.3f}, mean {cover.mean():.3f}")
-    low, middle, high = np.quantile(ratio, [0.25, 0.5, 0.75])
-    print(f"{len(rows)} cases; RMSE after over the oracle's: median {middle:.3f} ({low:.3f} to {high:.3f})")
+    for label in ("after", "named"):
+        ratio = np.array([float(r[f"rmse_{label}_N"]) / float(r["rmse_oracle_N"]) for r in rows])
+        low, middle, high = np.quantile(ratio, [0.25, 0.5, 0.75])
+        print(
+            f"RMSE {label} over the oracle's, {len(rows)} cases: median {middle:.3f} ({low:.3f}-{high:.3f})"
+        )
 
 
 if __name__ == "__main__":

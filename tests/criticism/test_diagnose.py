@@ -39,6 +39,9 @@ def test_the_gain_is_measured_on_levels_left_out(runs: tuple[Path, frozenset[str
     assert gain["elpd_gain"] > 3.0 * gain["elpd_gain_se"]
     assert gain["coverage90_after"] >= 0.8
     assert gain["folds_same_set"] >= gain["folds"] - 1
+    # Kept in every fold, the causes predict at least about as well as what the folds find.
+    assert gain["rmse_named_N"] < 1.1 * gain["rmse_after_N"]
+    assert gain["coverage90_named"] >= 0.8
 
 
 def test_nothing_hidden_is_adequate_and_the_bytes_repeat(tmp_path: Path) -> None:

@@ -1,0 +1,47 @@
+"""Predictions of levels left out: bands that hold what no remainder of the search is large enough for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rig import sets
+
+from criticism.test_hypotheses import problem_of, specimen_of
+from mpam_calib.criticism.fit import fit
+from mpam_calib.criticism.gain import Z90, predict_rows
+from mpam_calib.criticism.problem import SIZES, Problem
+
+
+@pytest.fixture(scope="module")
+def null_problem() -> Problem:
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
+    return problem_of(specimen_of(recipe.name))
+
+
+def covered(problem: Problem, size: int) -> float:
+    """Share of the readings in their 90 % bands, each level predicted from the others."""
+    inside = []
+    for level in np.unique(problem.level):
+        held = problem.level == level
+        fitted = fit(problem.take(~held), frozenset(), size)
+        mean, covariance = predict_rows(problem, fitted, (np.flatnonzero(~held), np.flatnonzero(held)))
+        inside.append(np.abs(problem.force[held] - mean) <= Z90 * np.sqrt(np.diagonal(covariance)))
+    return float(np.mean(np.concatenate(inside)))
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3])
+def test_bands_hold_a_misfit_that_no_remainder_holds(null_problem: Problem, share: float) -> None:
+    """Every level is off by a curve of its own, 10 or 30 % of the force scale: the search stops at 3 %."""
+    rng = np.random.default_rng(5)
+    x = null_problem.middle().displacement / null_problem.middle().displacement.max()
+    waves = np.cos(np.pi * np.arange(4) * x[:, None])
+    amplitudes = rng.standard_normal((null_problem.level.max() + 1, 4)) / 2.0
+    off = share * null_problem.force_scale * np.sum(amplitudes[null_problem.level] * waves, axis=1)
+    wrong = replace(null_problem, force=null_problem.force + off)
+    assert 0.8 <= covered(wrong, len(SIZES) - 1) <= 0.99
+
+
+def test_bands_are_no_wider_than_they_need_be(null_problem: Problem) -> None:
+    assert covered(null_problem, 0) == pytest.approx(0.9, abs=0.06)
