@@ -46,7 +46,7 @@ class Effect:
     the same thing with the same parameters, declared as ``id:form``. ``uses_force`` is set where it
     needs the muscle's own force (a fixture that gives way), which the chain then finds by fixed
     point. ``needs_braid`` is set where it needs the declared strands. ``bends`` names the drivers (and
-    degrees) along which its first parameter may vary in the form ``id:bent``
+    degrees) along which its parameters may vary, all alike, in the form ``id:bent``
     (:mod:`mpam_calib.model.bend`), and ``kinds`` those of its forms that differ from it in kind and may bend
     too (``id:form-bent``); an effect without parameters then reads its size under its own id.
     """
@@ -102,7 +102,7 @@ def effect(identifier: str) -> Effect:
 
 
 def bent(item: Effect) -> Effect:
-    """The effect with a size that varies smoothly along its drivers."""
+    """The effect with sizes that vary smoothly along its drivers, all of them alike."""
 
     def parameters(setting: Setting) -> tuple[Parameter, ...]:
         own = item.parameters(setting)
@@ -110,11 +110,9 @@ def bent(item: Effect) -> Effect:
         return (*own, *bend_parameters(name, item.bends, constant=not own))
 
     def apply(state: State, values: Values, setting: Setting) -> State:
-        own = item.parameters(setting)
-        name = own[0].name if own else item.id
-        size = values[name] if own else np.ones((1, 1))
-        factor = bend_factor(name, item.bends, values, state, setting)
-        return item.apply(state, {**values, name: size * factor}, setting)
+        sizes = {p.name: values[p.name] for p in item.parameters(setting)} or {item.id: np.ones((1, 1))}
+        factor = bend_factor(next(iter(sizes)), item.bends, values, state, setting)
+        return item.apply(state, {**values, **{name: size * factor for name, size in sizes.items()}}, setting)
 
     return replace(item, parameters=parameters, apply=apply)
 

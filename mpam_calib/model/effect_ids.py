@@ -32,7 +32,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "dead_band": ("bent", "soft"),
     "presliding": ("bent", "rest", "rest-bent"),
     "stress_softening": ("bent", "force", "force-bent"),
-    "law_shape": (),
+    "creep": ("bent", "wall", "wall-bent"),
 }
 """Other forms of the effects, declared as ``id:form``."""
 

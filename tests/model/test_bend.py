@@ -16,6 +16,7 @@ from mpam_calib.model.state import Setting, State
 
 from . import build
 
+OF_THE_BLADDER = ("stress_softening", "law_shape")
 BENT = sorted(e for e in known_effects() if effect(e).bends)
 
 
@@ -66,8 +67,8 @@ def force_of(form: str, u: float, bends: float) -> np.ndarray:
 def test_a_straight_bend_is_the_plain_effect(identifier: str) -> None:
     plain, bent = force_of(identifier, 0.7, 0.0), force_of(f"{identifier}:bent", 0.7, 0.0)
     assert bent == pytest.approx(plain, rel=1e-12, abs=1e-9)
-    if identifier == "stress_softening":
-        return  # it acts on the bladder, and there is none here
+    if identifier in OF_THE_BLADDER:
+        return  # and there is none here
     moved = force_of(f"{identifier}:bent", 0.7, 1.0)
     assert np.max(np.abs(moved - plain)) > 1e-3 * np.max(np.abs(plain - force_of(identifier, -7.0, 0.0)))
 
@@ -91,6 +92,23 @@ def test_the_size_follows_the_driver() -> None:
     shifted = replace(readings, displacement=readings.displacement + local)
     expected = Chain(plain, None, False).force(values, np.zeros((1, 0)), shifted)[0]
     assert bent == pytest.approx(expected, rel=1e-12)
+
+
+def test_an_effect_of_several_sizes_bends_as_a_whole() -> None:
+    """A law's bends, one for each power of pressure, all change along the stroke by the same factor."""
+    setting = setting_for("law_shape:bent")
+    readings = rows(setting)
+    names = [p.name for p in effect("law_shape").parameters(setting)]
+    assert len(names) > 1
+    values = {name: np.array([[0.1 * (i + 1)]]) for i, name in enumerate(names)}
+    values |= {"law_bend_1_bend_1": np.array([[0.4]]), "law_bend_1_bend_2": np.array([[0.0]])}
+    item = effect("law_shape:bent")
+    gain = item.apply(Chain(setting, None, False).start(readings, np.zeros(1)), values, setting).wall_gain
+    pressure = 2.0 * readings.pressure - setting.levels[0] - setting.top_pressure
+    x = pressure / (setting.top_pressure - setting.levels[0])
+    law = np.polynomial.legendre.legval(x, [0.0, *(values[name][0, 0] for name in names)])
+    along = 2.0 * readings.displacement / setting.stroke - 1.0
+    np.testing.assert_allclose(gain[0], 1.0 + law * np.exp(0.4 * along), rtol=1e-12)
 
 
 @pytest.mark.parametrize("bends", [-50.0, 50.0])
@@ -126,3 +144,14 @@ def test_kinds_bend_too() -> None:
     )
     with pytest.raises(KeyError):
         effect("creep:nonsense")
+
+
+def test_creep_of_the_bladder_is_a_gain_on_its_stress() -> None:
+    setting = setting_for("creep:wall")
+    readings = rows(setting)
+    state = Chain(setting, None, False).start(readings, np.zeros(1))
+    given = {"creep_per_decade": np.array([[0.05]])}
+    relaxed = effect("creep:wall").apply(state, given, setting)
+    expected = 1.0 - 0.05 * np.log10(1.0 + readings.time_at_level)
+    np.testing.assert_allclose(relaxed.wall_gain[0], expected, rtol=1e-12)
+    assert relaxed.gain is state.gain

@@ -28,6 +28,6 @@ register(
         source="thesis Eq. 2.10, 2.23 in place of Eq. 4.16",
         parameters=_parameters,
         apply=_apply,
-        bends={"contraction": 1},
+        bends={"contraction": 2},
     )
 )

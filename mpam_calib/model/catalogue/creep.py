@@ -25,6 +25,12 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, gain=state.gain * (1.0 - values["creep_per_decade"] * decades))
 
 
+def _wall(state: State, values: Values, setting: Setting) -> State:
+    """The bladder's stress relaxes; the gas and the braid do not."""
+    decades = np.log10(1.0 + state.readings.time_at_level / ONSET)
+    return replace(state, wall_gain=state.wall_gain * (1.0 - values["creep_per_decade"] * decades))
+
+
 register(
     Effect(
         id="creep",
@@ -35,6 +41,8 @@ register(
         source="logarithmic relaxation: F(1 − creep·log10(1 + t/1 s))",
         parameters=_parameters,
         apply=_apply,
+        forms={"wall": _wall},
+        kinds=("wall",),
         bends={"level_time": 2},
     )
 )

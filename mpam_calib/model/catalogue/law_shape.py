@@ -9,7 +9,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.priors import LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 TERMS = 6
 """Polynomials beyond the law's, as far as there are levels."""
 SD = 0.3
-"""Prior sd of the lowest; the next are smaller by 2/3, 1/2."""
+"""Prior scale of the lowest; the n-th is smaller by n^1.5: laws of pressure are smooth."""
 
 
 def _degrees(setting: Setting) -> range:
@@ -28,9 +28,7 @@ def _degrees(setting: Setting) -> range:
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return tuple(
-        Parameter(
-            f"law_bend_{j}", Normal(0.0, 2.0 * SD / (1 + number)), f"part of degree {j} in pressure", "", ""
-        )
+        Parameter(f"law_bend_{j}", LongTailed(SD / number**1.5), f"part of degree {j} in pressure", "", "")
         for number, j in enumerate(_degrees(setting), start=1)
     )
 
@@ -54,5 +52,6 @@ register(
         source="bladder stress × (1 + Σ bend_j·Legendre polynomials in pressure beyond the law's)",
         parameters=_parameters,
         apply=_apply,
+        bends={"contraction": 2},
     )
 )
