@@ -111,8 +111,9 @@ def _fold(task: tuple[tuple[str, ...], Set, NDArray[np.bool_]]) -> _Fold:
     chosen = judge(found).standing
     for size in range(len(SIZES)):
         found.refit_all((effects, size) for effects in (chosen, causes))
+    named = causes if causes in found.sets else chosen  # no climb may have an end without these rows
     index = (np.flatnonzero(~held), np.flatnonzero(held))
-    results = [_predict(problem, found, effects, index) for effects in (frozenset(), chosen, causes)]
+    results = [_predict(problem, found, effects, index) for effects in (frozenset(), chosen, named)]
     residuals = [problem.force[held] - mean for mean, _ in results]
     covariances = [covariance for _, covariance in results]
     return _Fold(
