@@ -21,6 +21,10 @@ Array = NDArray[np.float64]
 GRADIENT_STEP = 2e-5
 BATCH = 16
 """Points of any other density evaluated at once."""
+TRIED, CLIMBED = 256, 4
+"""Prior draws that are looked at, and the best of them that climbs start from."""
+LOUD = 3.0
+"""Prior sds of the noise under which the draws are compared."""
 HOPELESS = 15.0
 """Nats below the best at which a climb has got stuck rather than found a mode."""
 LOOSEST = 0.2
@@ -124,9 +128,12 @@ def climb_modes(target: Collapsed, starts: list[Array]) -> list[Mode]:
 
 
 def find_modes(target: Collapsed, rng: np.random.Generator) -> list[Mode]:
-    """Modes from the priors' centre, a structured start and the best of some prior draws."""
+    """Modes from the priors' centre, a structured start and the best of many prior draws."""
     d = len(target.model.names)
-    draws = rng.standard_normal((32, d))
-    best = draws[np.argsort(-evaluate(target, draws))[:2]]
+    draws = rng.standard_normal((TRIED, d))
+    for name in {WHITE, NOISE} & set(target.model.names):
+        # Under one large noise the draws that fit best come first, not those that happen to have much of it.
+        draws[:, target.model.names.index(name)] = LOUD
+    best = draws[np.argsort(-evaluate(target, draws))[:CLIMBED]]
     centre = np.zeros(d)
     return climb_modes(target, [centre, _structured(target, centre), *best])

@@ -15,8 +15,9 @@ from mpam_calib.specimen.declaration import Sensors
 from . import sbc
 from .test_sbc import MODELS
 
-SEEDS = (62, 3)
-"""Truths of the shared-rate exponential law: one whose force reaches from -186 N to 296 N, and another."""
+SEEDS = (62, 134, 170, 3)
+"""Truths of the shared-rate exponential law: three whose muscle also pushes (the first from -186 N to 296 N;
+to the others' rates no climb from the middle of the priors led), and one whose muscle pulls."""
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -28,7 +29,8 @@ def test_the_truth_is_as_probable_as_the_mode(seed: int) -> None:
     u, _, made = sbc.simulate(made, blueprint, rng)
     target, modes = locate(build_target(made, blueprint), np.random.default_rng([seed, 0]))
     # Twice the distance is chi-squared with as many degrees of freedom as there are sampled parameters.
-    assert modes[0].log_posterior - target.log_posterior(u)[0] < 15.0
+    above = modes[0].log_posterior - target.log_posterior(u)[0]
+    assert -1e-3 < above < 15.0
 
 
 def test_a_slack_reading_has_the_friction_of_one_that_pulls() -> None:
