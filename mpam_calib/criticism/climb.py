@@ -5,7 +5,8 @@ All on the axes that whiten the problem's noise and remainder; both priors enter
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +33,10 @@ FURTHEST, MOST_BENT = 7.0, 2.5
 """Largest coordinate (prior sds) of a size, and of a bend."""
 REACH = 1.5
 """Longest step of a coordinate, prior sds."""
+RUNAWAY = 10.0
+"""Times the force scale that such a force may move at once before it is given up."""
+DECEIVED = 0.5
+"""Nats by which a climb may have been better off than with the force come to rest."""
 COARSE = 0.01
 """Share of the misfit below which the sizes have settled well enough to let them bend."""
 
@@ -134,18 +139,58 @@ class Climb:
         fixed = np.broadcast_to(got.fixed, (len(u), len(readings)))
         return fixed, np.broadcast_to(got.columns, (len(u), len(readings), self.chain.linear_size))
 
+    @cached_property
+    def _still(self) -> float:
+        """Newtons to which a force that depends on itself must have settled."""
+        return SETTLED * self.problem.noise_level.total
+
+    def look_at_rest(self, u: Array, guide: Array, eta: Array) -> Place:
+        """:meth:`look` with a force that depends on itself come to rest, as predictions solve for it.
+
+        Where it never does the objective is -inf: a specimen that pulls the harder the more it contracts
+        has no equilibrium with a fixture that is soft enough.
+        """
+        for _round in range(ROUNDS):
+            place = self.look(u, guide, eta)
+            gap = float(np.abs(place.guide - guide).max())
+            if gap <= self._still:
+                return place
+            if not gap < RUNAWAY * self.problem.force_scale:
+                break
+            guide, eta = place.guide, place.eta[: self.chain.linear_size]
+        return replace(place, objective=-np.inf)
+
     def climb(self, u: Array, guide: Array, eta: Array) -> Place:
-        """The mode that is reached from u (d,)."""
-        d, still = len(u), SETTLED * self.problem.noise_level.total
+        """The mode that is reached from u (d,).
+
+        Raises ``numpy.linalg.LinAlgError`` where a force that depends on itself has no equilibrium.
+        """
+        best = self._ascend(u, guide, eta, self.look)
+        if not self.chain.uses_force:
+            return best
+        # One step of the fixed point is cheap, but may look better than the force it leads to.
+        rest = self.look_at_rest(best.u, best.guide, best.eta[: self.chain.linear_size])
+        if rest.objective < best.objective - DECEIVED:
+            rest = self._ascend(u, guide, eta, self.look_at_rest)
+        if not np.isfinite(rest.objective):
+            raise np.linalg.LinAlgError("a force that depends on itself does not come to rest")
+        return rest
+
+    def _ascend(
+        self, u: Array, guide: Array, eta: Array, look: Callable[[Array, Array, Array], Place]
+    ) -> Place:
+        d = len(u)
         bends = np.array([BENDS in name for name in self.names], dtype=bool)
         furthest = np.where(bends, MOST_BENT, FURTHEST)
         released = not bends.any() or bool(np.any(u[bends] != 0.0))
         best: Place | None = None
         damping = 1e-3
         for _round in range(ROUNDS):
-            place = self.look(u, guide, eta)
+            place = look(u, guide, eta)
+            if best is None and not np.isfinite(place.objective):
+                return place
             if best is None or place.objective > best.objective:
-                waiting = self.chain.uses_force and float(np.abs(place.guide - guide).max()) > still
+                waiting = self.chain.uses_force and float(np.abs(place.guide - guide).max()) > self._still
                 damping = max(damping / 5.0, 1e-6)
                 best = place
             else:

@@ -13,6 +13,7 @@ from scipy import stats
 
 from mpam_calib.criticism.candidates import candidates
 from mpam_calib.criticism.fit import fit
+from mpam_calib.criticism.gain import linearise
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.chain import Chain
@@ -116,3 +117,22 @@ def test_noise_is_found_before_any_model(null_problem: Problem) -> None:
     truth = recipes.build_case(recipe).protocol
     total = float(np.hypot(truth.noise_N, truth.correlated_N))
     assert null_problem.noise_level.total == pytest.approx(total, rel=0.3)
+
+
+DATASETS = Path(__file__).parents[2] / "datasets"
+
+
+@pytest.mark.parametrize("start", [0.0, 5.2, 7.0])
+def test_a_fixture_too_soft_for_the_specimen_is_not_believed(start: float) -> None:
+    """A cylinder pulls the harder the more it contracts: beside a soft fixture its force never settles.
+
+    One step of the fixed point looks 280 nats better there than the force that predictions then solve for.
+    """
+    problem = problem_of(read(DATASETS / "cylinder_zillen"))
+    causes = frozenset({"order_too_low", "rig_compliance"})
+    try:
+        found = fit(problem, causes, 2, {"compliance_mm_per_N": start, "K_f": -1.25, "next_order": 0.4})
+    except np.linalg.LinAlgError:
+        return  # no equilibrium from there: refused
+    force, _ = linearise(problem, found)
+    assert np.abs(force + problem.bow - found.force).max() < 0.1 * problem.noise_level.total
