@@ -3,8 +3,10 @@
 No rig follows an equation to the letter: a fixture stiffens, relaxation is no straight line over the
 logarithm of time. An effect declared as ``id:bent`` has its size multiplied by a smooth positive
 function of what drives it, exp(Σ c_j P_j(v)), with Legendre polynomials P_1, P_2 of a driver v in about
-−1..1 (the contraction, the pressure, the time ...) and c_j ~ N(0, (BEND/j)²). So a name survives an
-equation that is not quite the real one, and pays for the freedom in its evidence.
+−1..1 (the contraction, the pressure, the time ...) and c_j ~ N(0, (looseness·BEND/j)²). So a name survives an
+equation that is not quite the real one, and pays for the freedom in its evidence. Along the contraction and
+the time of the test the factor is the polynomial 1 + Σ c_j P_j(v) itself: what grows with the square of the
+stroke instead of the stroke, or a zero that comes back, has a factor that passes through nothing.
 """
 
 from __future__ import annotations
@@ -28,12 +30,14 @@ BEND: Final[Mapping[str, float]] = {"contraction": 0.25, "pressure": 0.25, "forc
 """Prior sd of the first bend: a size that differs by ±25 % between the two ends of its driver ..."""
 LOOSE: Final = 0.5
 """... and for the others, whose laws are the least known: how things fade with time, cycles and travel."""
-MOST: Final = 1.5
+MOST: Final = 3.0
 """Largest logarithm of the factor, whatever the coefficients."""
 EARLY: Final = 20.0
 """Duration of the test over that of the part in which something that settles does most of it."""
-TURN_SHARE: Final = 0.03
-"""Share of the stroke after which a turn is half over, for the driver ``travel``."""
+TURN_SHARE: Final = 0.01
+"""Share of the stroke from which on the driver ``travel`` counts its decades."""
+CYCLES: Final = 2.0
+"""Cycles from the middle to the ends of the driver ``cycles``."""
 
 
 def _pressure(state: State, setting: Setting) -> Array:
@@ -47,8 +51,8 @@ def _speed(state: State, setting: Setting) -> Array:
 
 
 def _travel(state: State, setting: Setting) -> Array:
-    travel = state.readings.travel
-    return 2.0 * travel / (travel + TURN_SHARE * setting.stroke) - 1.0
+    travel = state.readings.travel / setting.stroke
+    return np.asarray(2.0 * np.log1p(travel / TURN_SHARE) / np.log1p(1.0 / TURN_SHARE) - 1.0)
 
 
 DRIVERS: Final[Mapping[str, Callable[[State, Setting], Array]]] = {
@@ -63,14 +67,24 @@ DRIVERS: Final[Mapping[str, Callable[[State, Setting], Array]]] = {
         2.0 * np.log1p(state.readings.time_at_level) / np.log1p(max(setting.level_time, 1.0)) - 1.0
     ),
     "cycle": lambda state, setting: 2.0 / state.readings.cycle - 1.0,
+    "cycles": lambda state, setting: (state.readings.cycle - 1.0) / CYCLES - 1.0,
     "speed": _speed,
     "travel": _travel,
 }
 """What a shape may bend with, in about −1..1 over the recordings: (n,) or (B, n)."""
 
 
-def bend_parameters(name: str, bends: Mapping[str, int], constant: bool) -> tuple[Parameter, ...]:
-    """The coefficients c_j of a size called ``name``; with a constant one where the size itself is none."""
+POLYNOMIAL: Final = ("contraction", "time")
+"""Drivers along which the factor is a polynomial and may vanish."""
+
+
+def bend_parameters(
+    name: str, bends: Mapping[str, int], looseness: float, constant: bool
+) -> tuple[Parameter, ...]:
+    """The coefficients c_j of a size called ``name``; with a constant one where the size itself is none.
+
+    Their prior sds are ``looseness`` times those of BEND.
+    """
     found = (
         [Parameter(f"{name}{BENDS}0", Normal(0.0, LOOSE), "logarithm of the size", "", "")]
         if constant
@@ -81,21 +95,28 @@ def bend_parameters(name: str, bends: Mapping[str, int], constant: bool) -> tupl
         for j in range(1, degree + 1):
             number += 1
             meaning = f"bend of the shape along {driver.replace('_', ' ')}, degree {j}"
-            found.append(
-                Parameter(f"{name}{BENDS}{number}", Normal(0.0, BEND.get(driver, LOOSE) / j), meaning, "", "")
-            )
+            sd = looseness * BEND.get(driver, LOOSE) / j
+            found.append(Parameter(f"{name}{BENDS}{number}", Normal(0.0, sd), meaning, "", ""))
     return tuple(found)
 
 
 def bend_factor(
     name: str, bends: Mapping[str, int], values: Mapping[str, Array], state: State, setting: Setting
 ) -> Array:
-    """exp(Σ c_j P_j(v)) for every reading, (B, n)."""
+    """exp(Σ c_j P_j(v)), or 1 + Σ c_j P_j(v) along POLYNOMIAL drivers, for every reading, (B, n)."""
     log: Array = np.asarray(values.get(f"{name}{BENDS}0", np.zeros((1, 1))))
+    factor = np.ones((1, 1))
     number = 0
     for driver, degree in bends.items():
         v = np.clip(DRIVERS[driver](state, setting), -1.5, 1.5)
+        total = np.zeros((1, 1))
+        before, here = np.ones_like(v), v
         for j in range(1, degree + 1):
             number += 1
-            log = log + values[f"{name}{BENDS}{number}"] * (v if j == 1 else 1.5 * v**2 - 0.5)
-    return np.exp(np.clip(log, -MOST, MOST))
+            total = total + values[f"{name}{BENDS}{number}"] * here
+            before, here = here, ((2 * j + 1) * v * here - j * before) / (j + 1)
+        if driver in POLYNOMIAL:
+            factor = factor * (1.0 + total)
+        else:
+            log = log + total
+    return np.asarray(factor * np.exp(np.clip(log, -MOST, MOST)))

@@ -47,8 +47,9 @@ class Effect:
     needs the muscle's own force (a fixture that gives way), which the chain then finds by fixed
     point. ``needs_braid`` is set where it needs the declared strands. ``bends`` names the drivers (and
     degrees) along which its parameters may vary, all alike, in the form ``id:bent``
-    (:mod:`mpam_calib.model.bend`), and ``kinds`` those of its forms that differ from it in kind and may bend
-    too (``id:form-bent``); an effect without parameters then reads its size under its own id.
+    (:mod:`mpam_calib.model.bend`), ``looseness`` how many times as far as usual, and ``kinds`` those of its
+    forms that differ from it in kind and may bend too (``id:form-bent``); an effect without parameters then
+    reads its size under its own id.
     """
 
     id: str
@@ -63,6 +64,7 @@ class Effect:
     uses_force: bool = False
     needs_braid: bool = False
     bends: Mapping[str, int] = field(default_factory=dict)
+    looseness: float = 1.0
     kinds: tuple[str, ...] = ()
 
     @property
@@ -107,7 +109,7 @@ def bent(item: Effect) -> Effect:
     def parameters(setting: Setting) -> tuple[Parameter, ...]:
         own = item.parameters(setting)
         name = own[0].name if own else item.id
-        return (*own, *bend_parameters(name, item.bends, constant=not own))
+        return (*own, *bend_parameters(name, item.bends, item.looseness, constant=not own))
 
     def apply(state: State, values: Values, setting: Setting) -> State:
         sizes = {p.name: values[p.name] for p in item.parameters(setting)} or {item.id: np.ones((1, 1))}

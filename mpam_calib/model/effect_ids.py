@@ -30,9 +30,11 @@ EFFECT_IDS: Final[tuple[str, ...]] = (
 EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(EFFECT_IDS, ("bent",)),
     "dead_band": ("bent", "soft"),
+    "rate_friction": ("bent", "viscous", "viscous-bent"),
     "presliding": ("bent", "rest", "rest-bent"),
     "stress_softening": ("bent", "force", "force-bent"),
     "creep": ("bent", "wall", "wall-bent"),
+    "force_drift": ("bent", "settling", "settling-bent"),
 }
 """Other forms of the effects, declared as ``id:form``."""
 

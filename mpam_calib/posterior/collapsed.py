@@ -171,8 +171,6 @@ class Collapsed:
             return self._white_bins(values, bins)
         if self._strokes is not None:
             return self._even_bins(values, bins, self._strokes)
-        if self._strokes is not None:
-            return self._even_bins(values, bins, self._strokes)
         n = len(bins)
         terms = self.model.chain.terms(values, bins.readings, self.guide.bins)
         fixed = 0.5 * (terms.fixed[:, :n] + terms.fixed[:, n:])

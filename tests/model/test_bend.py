@@ -87,7 +87,7 @@ def test_the_size_follows_the_driver() -> None:
     bent = Chain(setting, None, False).force(values, np.zeros((1, 0)), readings)[0]
     along = 2.0 * readings.displacement / setting.stroke - 1.0
     in_time = 2.0 * np.log(1.0 + 20.0 * readings.time / setting.duration) / np.log(21.0) - 1.0
-    local = 1e-3 * np.exp(0.4 * along - 0.3 * in_time)
+    local = 1e-3 * (1.0 + 0.4 * along) * np.exp(-0.3 * in_time)
     plain = replace(setting, simulation=setting.simulation.model_copy(update={"effects": ()}))
     shifted = replace(readings, displacement=readings.displacement + local)
     expected = Chain(plain, None, False).force(values, np.zeros((1, 0)), shifted)[0]
@@ -108,26 +108,65 @@ def test_an_effect_of_several_sizes_bends_as_a_whole() -> None:
     x = pressure / (setting.top_pressure - setting.levels[0])
     law = np.polynomial.legendre.legval(x, [0.0, *(values[name][0, 0] for name in names)])
     along = 2.0 * readings.displacement / setting.stroke - 1.0
-    np.testing.assert_allclose(gain[0], 1.0 + law * np.exp(0.4 * along), rtol=1e-12)
+    np.testing.assert_allclose(gain[0], 1.0 + law * (1.0 + 0.4 * along), rtol=1e-12)
 
 
 @pytest.mark.parametrize("bends", [-50.0, 50.0])
-def test_an_effect_never_turns_round(bends: float) -> None:
+def test_what_fades_never_turns_round(bends: float) -> None:
     """However far the coefficients go, the local size keeps its sign and stays within e^±MOST of its own."""
-    form = "length_offset:bent"
+    form = "creep:bent"
     setting = setting_for(form)
-    given = dict(values_of(setting, form, 0.0, bends)) | {"offset_mm": np.array([[1e-3]])}
+    given = dict(values_of(setting, form, 0.0, bends)) | {"creep_per_decade": np.array([[0.01]])}
     seen: list[np.ndarray] = []
 
     def watch(state: State, values: Values, where: Setting) -> State:
-        seen.append(np.asarray(values["offset_mm"]))
+        seen.append(np.asarray(values["creep_per_decade"]))
         return state
 
-    item = replace(effect("length_offset"), apply=watch)
+    item = replace(effect("creep"), apply=watch)
     bent(item).apply(Chain(setting, None, False).start(rows(setting), np.zeros(1)), given, setting)
-    local = seen[0] / 1e-3
+    local = seen[0] / 0.01
     assert local.min() >= np.exp(-MOST) - 1e-12 and local.max() <= np.exp(MOST) + 1e-12
     assert local.min() < 1.0 < local.max()
+
+
+def test_a_bend_along_the_stroke_turns_its_first_power_into_the_second() -> None:
+    """A droop in proportion to the stroke, times 1 + P₁, is one with the stroke's square: exactly."""
+    form = "pressure_droop:bent"
+    setting = setting_for(form)
+    names = {p.name: np.zeros((1, 1)) for p in effect(form).parameters(setting)}
+    given = names | {"droop_percent": np.array([[0.04]]), "droop_percent_bend_1": np.array([[1.0]])}
+    readings = rows(setting)
+    drooped = effect(form).apply(Chain(setting, None, False).start(readings, np.zeros(1)), given, setting)
+    share = readings.displacement / setting.stroke
+    np.testing.assert_allclose(drooped.pressure[0], readings.pressure * (1.0 - 0.08 * share**2), rtol=1e-12)
+
+
+def test_friction_in_proportion_to_speed_does_not_know_the_force() -> None:
+    """``rate_friction:viscous``: beside Coulomb friction K at the force scale, rate·K·(v/v₀)/ln 10 of it."""
+    form = "rate_friction:viscous"
+    setting = setting_for(form)
+    readings = rows(setting)
+    start = replace(Chain(setting, None, False).start(readings, np.zeros(1)), coulomb=np.array([[0.05]]))
+    moved = effect(form).apply(start, {"rate_per_decade": np.array([[0.4]])}, setting)
+    per_decade = 0.4 * 0.05 * setting.force_scale
+    expected = readings.sign * per_decade * readings.speed / setting.speed / np.log(10.0)
+    np.testing.assert_allclose(moved.zero[0], expected, rtol=1e-12)
+    assert moved.friction_gain is start.friction_gain
+
+
+def test_a_drift_that_settles_ends_where_the_straight_one_does() -> None:
+    setting = setting_for("force_drift:settling")
+    readings = rows(setting)
+    start = Chain(setting, None, False).start(readings, np.zeros(1))
+    given = {"drift_N_per_min": np.array([[0.3]])}
+    late, straight = (
+        effect(f).apply(start, given, setting).zero[0] for f in ("force_drift:settling", "force_drift")
+    )
+    np.testing.assert_allclose(
+        np.interp(50.0, readings.time, late / straight), np.log(11.0) / np.log(21.0) * 2.0, rtol=1e-3
+    )
+    assert np.all(late > straight)
 
 
 def test_the_list_of_forms_is_that_of_the_effects() -> None:

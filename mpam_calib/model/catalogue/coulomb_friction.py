@@ -38,6 +38,7 @@ register(
         source="thesis Eq. 2.44",
         parameters=_parameters,
         apply=_apply,
-        bends={"force": 1, "pressure": 1},
+        bends={"force": 2, "pressure": 1, "contraction": 1},
+        looseness=1.5,
     )
 )

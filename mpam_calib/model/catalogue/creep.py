@@ -43,6 +43,7 @@ register(
         apply=_apply,
         forms={"wall": _wall},
         kinds=("wall",),
-        bends={"level_time": 2},
+        bends={"level_time": 3},
+        looseness=1.5,
     )
 )

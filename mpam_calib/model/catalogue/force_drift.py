@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mpam_calib.model.bend import EARLY
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
@@ -22,6 +23,13 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, zero=state.zero + values["drift_N_per_min"] * state.readings.time)
 
 
+def _settling(state: State, values: Values, setting: Setting) -> State:
+    """Most of it early in the test, as a load cell warms up."""
+    span = max(setting.duration, 1.0)
+    path = span * np.log1p(EARLY * state.readings.time / span) / np.log1p(EARLY)
+    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+
+
 register(
     Effect(
         id="force_drift",
@@ -32,6 +40,9 @@ register(
         source="linear in time over the whole test",
         parameters=_parameters,
         apply=_apply,
-        bends={"time": 2},
+        forms={"settling": _settling},
+        kinds=("settling",),
+        bends={"time": 4},
+        looseness=4.0,
     )
 )

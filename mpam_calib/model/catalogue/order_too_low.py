@@ -58,6 +58,7 @@ register(
         source="thesis Eq. 2.12 with M + 1 terms",
         parameters=_parameters,
         apply=_apply,
-        bends={"contraction": 2},
+        bends={"contraction": 3},
+        looseness=3.0,
     )
 )

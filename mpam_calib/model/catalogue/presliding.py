@@ -42,6 +42,7 @@ register(
         apply=_apply,
         forms={"rest": _from_rest},
         kinds=("rest",),
-        bends={"travel": 2},
+        bends={"travel": 3},
+        looseness=2.0,
     )
 )

@@ -28,6 +28,7 @@ register(
         source="first order in the stroke: P(1 − droop·x/stroke)",
         parameters=_parameters,
         apply=_apply,
-        bends={"contraction": 2},
+        bends={"contraction": 3},
+        looseness=3.0,
     )
 )

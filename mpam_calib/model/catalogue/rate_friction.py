@@ -9,6 +9,7 @@ import numpy as np
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
+from mpam_calib.physics.friction import strand_friction_per_f_s
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -24,6 +25,22 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, friction_gain=state.friction_gain * gain)
 
 
+def _viscous(state: State, values: Values, setting: Setting) -> State:
+    """Friction beside the declared one, in proportion to the speed and the same at any force.
+
+    The size is what the declared friction would grow by at the force scale, per decade at the mean speed.
+    """
+    speed = np.where(state.readings.speed > 0.0, state.readings.speed, setting.speed)
+    at_scale = state.coulomb * setting.force_scale
+    braid = setting.braid
+    if braid is not None and np.any(state.strand):
+        top = np.array([[setting.top_pressure]])
+        unit = strand_friction_per_f_s(top, state.rest.L0, state.rest, braid.E_br, braid.nu_s)
+        at_scale = at_scale + state.strand * unit
+    added = values["rate_per_decade"] * at_scale * (speed / setting.speed) / np.log(10.0)
+    return replace(state, zero=state.zero + state.sign * added)
+
+
 register(
     Effect(
         id="rate_friction",
@@ -34,6 +51,9 @@ register(
         source="logarithmic in speed, relative to the geometric mean of the test's speeds",
         parameters=_parameters,
         apply=_apply,
+        forms={"viscous": _viscous},
+        kinds=("viscous",),
         bends={"speed": 2},
+        looseness=2.0,
     )
 )

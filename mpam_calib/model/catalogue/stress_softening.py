@@ -42,6 +42,7 @@ register(
         apply=_apply,
         forms={"force": _force},
         kinds=("force",),
-        bends={"cycle": 1, "contraction": 1},
+        bends={"cycle": 2, "cycles": 1, "contraction": 1},
+        looseness=3.0,
     )
 )

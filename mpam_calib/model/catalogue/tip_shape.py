@@ -32,6 +32,7 @@ register(
         source="thesis Eq. 2.46-2.47",
         parameters=_parameters,
         apply=_apply,
-        bends={"contraction": 2},
+        bends={"contraction": 3},
+        looseness=3.0,
     )
 )
