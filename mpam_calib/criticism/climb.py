@@ -21,8 +21,11 @@ Array = NDArray[np.float64]
 
 STEP = 1e-4
 ROUNDS = 25
-CONVERGED, SHARE = 5e-3, 1e-4
-"""Where the next round promises fewer nats than this, or than this share of the misfit, the climb ends."""
+CONVERGED, SHARE = 5e-3, 1e-3
+"""Where the next round promises fewer nats than this, or than this share of what the fit leaves beyond twice
+the noise, the climb ends."""
+KEPT = (0.25, 0.75)
+"""Shares of the promise below which the damping grows, and above which it falls."""
 RIDGE = 0.02
 """Least damping after a step that led downhill."""
 NUDGE = 1e-4
@@ -33,6 +36,8 @@ FURTHEST, MOST_BENT = 7.0, 2.5
 """Largest coordinate (prior sds) of a size, and of a bend."""
 REACH = 1.5
 """Longest step of a coordinate, prior sds."""
+SIGN_ROUNDS = 3
+"""Rounds in which the signs of the force settle; those of a few readings next to zero need not."""
 RUNAWAY = 10.0
 """Times the force scale that such a force may move at once before it is given up."""
 DECEIVED = 0.5
@@ -144,6 +149,18 @@ class Climb:
         """Newtons to which a force that depends on itself must have settled."""
         return SETTLED * self.problem.noise_level.total
 
+    def look_with_its_signs(self, u: Array, guide: Array, eta: Array) -> Place:
+        """:meth:`look` with friction against the force's own sign, not against that of the last estimate.
+
+        A place that looked better with the signs of another one would never be left again.
+        """
+        for _round in range(SIGN_ROUNDS):
+            place = self.look(u, guide, eta)
+            if np.array_equal(np.sign(place.guide), np.sign(guide)):
+                break
+            guide, eta = place.guide, place.eta[: self.chain.linear_size]
+        return place
+
     def look_at_rest(self, u: Array, guide: Array, eta: Array) -> Place:
         """:meth:`look` with a force that depends on itself come to rest, as predictions solve for it.
 
@@ -165,7 +182,7 @@ class Climb:
 
         Raises ``numpy.linalg.LinAlgError`` where a force that depends on itself has no equilibrium.
         """
-        best = self._ascend(u, guide, eta, self.look)
+        best = self._ascend(u, guide, eta, self.look_with_its_signs)
         if not self.chain.uses_force:
             return best
         # One step of the fixed point is cheap, but may look better than the force it leads to.
@@ -184,14 +201,16 @@ class Climb:
         furthest = np.where(bends, MOST_BENT, FURTHEST)
         released = not bends.any() or bool(np.any(u[bends] != 0.0))
         best: Place | None = None
-        damping = 1e-3
+        damping, promise, shortened = 1e-3, 0.0, False
         for _round in range(ROUNDS):
             place = look(u, guide, eta)
             if best is None and not np.isfinite(place.objective):
                 return place
             if best is None or place.objective > best.objective:
                 waiting = self.chain.uses_force and float(np.abs(place.guide - guide).max()) > self._still
-                damping = max(damping / 5.0, 1e-6)
+                kept = 1.0 if best is None or shortened else (place.objective - best.objective) / promise
+                damping *= 4.0 if kept < KEPT[0] else 0.2 if kept > KEPT[1] else 1.0
+                damping = max(damping, 1e-6)
                 best = place
             else:
                 waiting = False
@@ -209,10 +228,12 @@ class Climb:
             step = np.zeros(len(hessian))
             step[free] = linalg.solve(damped, gradient[free], assume_a="pos")
             promise = 0.5 * float(step @ gradient)
-            if d == 0 or (promise < max(CONVERGED, SHARE * misfit) and not waiting and released):
+            left = misfit - 2.0 * len(self.problem)
+            if d == 0 or (promise < max(CONVERGED, SHARE * left) and not waiting and released):
                 break
             # Sizes first: the bend of a size near zero says nothing and wanders off.
             released = released or promise < COARSE * misfit
+            shortened = float(np.abs(step[:d]).max(initial=0.0)) > REACH
             step *= min(1.0, REACH / float(np.abs(step[:d]).max(initial=1e-9)))
             u = np.clip(best.u + step[:d], -furthest, furthest)
         assert best is not None

@@ -136,3 +136,16 @@ def test_a_fixture_too_soft_for_the_specimen_is_not_believed(start: float) -> No
         return  # no equilibrium from there: refused
     force, _ = linearise(problem, found)
     assert np.abs(force + problem.bow - found.force).max() < 0.1 * problem.noise_level.total
+
+
+def test_a_fit_does_not_stay_where_the_force_has_another_sign() -> None:
+    """Near full stroke the force passes zero, where Coulomb friction turns round with its sign.
+
+    A place that was judged by the signs of the one before it could look better than any other: from nothing
+    this fit once ended 14 nats below the mode.
+    """
+    problem = problem_of(specimen_of("develop-separable-016"))
+    fold = problem.take(problem.level != 3)
+    causes = frozenset({"coulomb_friction", "dead_band"})
+    near = fit(fold, causes, 0, {"f_s": 0.45, "P_DB_kPa": 0.16, "K_f": -0.5})
+    assert fit(fold, causes, 0).log_evidence == pytest.approx(near.log_evidence, abs=0.05)

@@ -59,6 +59,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         bends={"contraction": 3},
-        looseness=3.0,
+        looseness=2.0,
     )
 )

@@ -29,6 +29,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         bends={"contraction": 3},
-        looseness=3.0,
+        looseness=2.0,
     )
 )
