@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from ..chain import Form
-from . import friction_stage, history_stage, rig_stage, shape_stage, statics_stage
+from . import friction_stage, history_stage, rig_stage, shape_stage, statics_stage, textbook
 
 FORMS: dict[tuple[str, str], Form] = {
     (form.id, form.name): form
-    for module in (rig_stage, shape_stage, statics_stage, friction_stage, history_stage)
+    for module in (rig_stage, shape_stage, statics_stage, friction_stage, history_stage, textbook)
     for form in module.FORMS
 }
 IDS: tuple[str, ...] = tuple(sorted({effect for effect, _ in FORMS}))
