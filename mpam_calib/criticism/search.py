@@ -21,7 +21,7 @@ from mpam_calib.criticism.doubt import DOUBTS
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
 from mpam_calib.criticism.spread import Alone, Spread, held_problem, spread_over
-from mpam_calib.model.bend import BENDS
+from mpam_calib.model.bend import BENDS, FORM
 from mpam_calib.model.effect import effect
 
 Array = NDArray[np.float64]
@@ -31,6 +31,9 @@ Try = tuple[tuple[str, ...], dict[str, float]]
 
 RATE = 0.001
 """Prior odds of one more cause: a passenger must not come close to the set that it rides on."""
+BENT = 2.0
+"""Nats by which an equation as it is written is likelier than a bent one: a rival that must bend in all its
+parts is not to come close to causes that follow theirs."""
 WIDTH = 6
 """Sets of each size that are extended further."""
 PARTNERS = 8
@@ -274,9 +277,14 @@ def _better(
             found = fit(held_problem(), frozenset(forms), size, start, doubts=doubts)
     except np.linalg.LinAlgError:
         return best
-    paid = sum(log(len(forms_of(form.partition(":")[0]))) for form in forms)
-    found = replace(found, log_evidence=found.log_evidence - paid)
+    found = replace(found, log_evidence=found.log_evidence - sum(map(_price, forms)))
     return found if best is None or found.log_evidence > best.log_evidence else best
+
+
+def _price(form: str) -> float:
+    """Nats that one form costs: its share of the prior among the effect's forms."""
+    identifier, _, name = form.partition(":")
+    return log(len(forms_of(identifier))) + (BENT if name.endswith(FORM) else 0.0)
 
 
 def _polish(found: Search, sets: Iterable[Set]) -> None:
