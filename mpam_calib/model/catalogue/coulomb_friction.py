@@ -38,7 +38,6 @@ register(
         source="thesis Eq. 2.44",
         parameters=_parameters,
         apply=_apply,
-        bends={"force": 2, "pressure": 1, "contraction": 1},
-        looseness=1.5,
+        bends={"force": 1, "pressure": 1, "contraction": 1},
     )
 )
