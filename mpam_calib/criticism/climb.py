@@ -208,7 +208,9 @@ class Climb:
                 return place
             if best is None or place.objective > best.objective:
                 waiting = self.chain.uses_force and float(np.abs(place.guide - guide).max()) > self._still
-                kept = 1.0 if best is None or shortened else (place.objective - best.objective) / promise
+                kept = 1.0
+                if best is not None and not shortened:
+                    kept = (place.objective - best.objective) / max(promise, 1e-12)
                 damping *= 4.0 if kept < KEPT[0] else 0.2 if kept > KEPT[1] else 1.0
                 damping = max(damping, 1e-6)
                 best = place
