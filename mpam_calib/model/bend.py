@@ -2,7 +2,7 @@
 
 No rig follows an equation to the letter: a fixture stiffens, relaxation is no straight line over the
 logarithm of time. An effect declared as ``id:bent`` has its size multiplied by a smooth positive
-function of what drives it, exp(Σ c_j P_j(v)), with Legendre polynomials P_1, P_2 of a driver v in about
+function of what drives it, exp(Σ c_j P_j(v)), with Legendre polynomials P_1, P_2 ... of a driver v in about
 −1..1 (the contraction, the pressure, the time ...) and c_j ~ N(0, (looseness·BEND/j)²). So a name survives an
 equation that is not quite the real one, and pays for the freedom in its evidence. Along the contraction and
 the time of the test the factor is the polynomial 1 + Σ c_j P_j(v) itself: what grows with the square of the
