@@ -16,6 +16,9 @@ from mpam_calib.criticism.search import Search, Set
 
 Array = NDArray[np.float64]
 
+TELLING = 2.0
+"""Rows tell of a misfit while their noise's sd is at most this many times the typical row's."""
+
 
 @dataclass(frozen=True)
 class Budget:
@@ -28,10 +31,19 @@ class Budget:
     shares: dict[str, float]
 
 
+def beyond_noise(residual: Array, variance: Array) -> float:
+    """Mean square (N²) of residuals (n,) beyond the noise's variances (n,).
+
+    Rows that nothing can be read from, their noise far above the typical (the crosshead rested there), are
+    left out: their doubt would pass for noise of all the others.
+    """
+    telling = variance <= TELLING**2 * np.median(variance)
+    return max(float(np.mean(residual[telling] ** 2 - variance[telling])), 0.0)
+
+
 def structured(problem: Problem, fitted: Fit) -> float:
-    """Mean square (N²) of a fit's residuals beyond what the noise of the rows accounts for."""
-    residual = problem.force - fitted.force
-    return max(float(np.mean(residual**2)) - float(np.mean(np.diagonal(problem.noise))), 0.0)
+    """Mean square (N²) of what a fit's equations leave beyond the noise."""
+    return beyond_noise(problem.force - fitted.force, np.diagonal(problem.noise))
 
 
 def misfit_budget(found: Search, causes: Set) -> Budget:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from mpam_calib.criticism.budget import beyond_noise
 from mpam_calib.criticism.candidates import HISTORY
 from mpam_calib.criticism.climb import STEP
 from mpam_calib.criticism.fit import Fit, chain_for, doubt_columns
@@ -172,8 +173,8 @@ def _outgrown(problem: Problem, fitted: Fit, train: NDArray[np.intp]) -> float:
     if fitted.size < len(SIZES) - 1:
         return 1.0
     left = problem.force[train] - fitted.force - fitted.doubt
-    structured = float(np.mean(left**2) - np.mean(np.diagonal(problem.noise)[train]))
-    return max(1.0, float(np.sqrt(max(structured, 0.0))) / (SIZES[-1] * problem.force_scale))
+    more = beyond_noise(left, np.diagonal(problem.noise)[train])
+    return max(1.0, float(np.sqrt(more)) / (SIZES[-1] * problem.force_scale))
 
 
 def linearise(problem: Problem, fitted: Fit, blueprint: Blueprint | None = None) -> tuple[Array, Array]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.budget import misfit_budget
+from mpam_calib.criticism.budget import beyond_noise, misfit_budget
 from mpam_calib.criticism.problem import SIZES
 from mpam_calib.criticism.search import Search
 from mpam_calib.criticism.spread import Alone
@@ -56,3 +57,24 @@ def test_a_climb_that_ended_badly_gives_no_negative_share(found: Search) -> None
     shares = misfit_budget(search, CAUSES).shares
     assert min(shares.values()) >= 0.0
     assert sum(shares.values()) <= 1.0 + 1e-9
+
+
+def test_rows_at_rest_hide_no_misfit_of_the_others() -> None:
+    """A wave of 3 N rms under 1 N of noise, and every tenth row in doubt by 20 N."""
+    rng = np.random.default_rng(5)
+    sd = np.where(np.arange(4000) % 10 == 0, 20.0, 1.0)
+    wave = 3.0 * np.sqrt(2.0) * np.sin(0.01 * np.arange(4000))
+    assert beyond_noise(wave + sd * rng.standard_normal(4000), sd**2) == pytest.approx(9.0, rel=0.05)
+    assert beyond_noise(sd * rng.standard_normal(4000), sd**2) < 0.1
+
+
+def test_a_crosshead_that_rests_leaves_the_budget_as_it_is(found: Search) -> None:
+    moving = misfit_budget(found, CAUSES)
+    problem = found.problem
+    rest = np.arange(len(problem)) % 12 == 0
+    doubt = np.where(rest, 20.0 * problem.noise_level.total, 0.0)
+    resting = replace(found, problem=replace(problem, noise=problem.noise + np.diag(doubt**2)))
+    budget = misfit_budget(resting, CAUSES)
+    assert budget.before == pytest.approx(moving.before, rel=0.1)
+    assert budget.after == pytest.approx(moving.after, abs=0.1 * moving.before)
+    assert budget.shares == pytest.approx(moving.shares, abs=0.1)
