@@ -94,11 +94,7 @@ class Climb:
 
     def guide(self) -> Array:
         """The measured force at the lean readings: the first estimate of what depends on the force."""
-        readings, first, second = self.problem.lean
-        result = np.empty(len(readings))
-        result[: len(self.problem)] = self.problem.force
-        result[first], result[second] = self.problem.force, self.problem.force
-        return result
+        return self.problem.at_lean(self.problem.force)
 
     def look(self, u: Array, guide: Array, eta: Array) -> Place:
         """Linearise at u; ``eta`` (p,) serves where the force depends on itself."""

@@ -20,7 +20,6 @@ from mpam_calib.criticism.climb import STEP
 from mpam_calib.criticism.fit import Fit, chain_for, doubt_columns
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.search import Search, Set, search
-from mpam_calib.criticism.spread import held_problem, spread_over
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.model.blueprint import Blueprint
 
@@ -75,13 +74,11 @@ def measure_gain(
     if len(labels) < 3:
         return None
     parts = [labels[i::FOLDS] for i in range(min(FOLDS, len(labels)))]
-    tasks = [(tested, causes, np.isin(groups, part)) for part in parts]
     folds = []
-    with spread_over(problem, workers) as spread:
-        for fold in spread(_fold, tasks):
-            folds.append(fold)
-            if tell is not None:
-                tell(len(folds) / len(tasks))
+    for part in parts:
+        folds.append(_fold(problem, tested, causes, np.isin(groups, part), workers))
+        if tell is not None:
+            tell(len(folds) / len(parts))
     errors = [
         float(np.sqrt(np.mean(np.concatenate(r) ** 2)))
         for r in zip(*(f.residuals for f in folds), strict=True)
@@ -103,11 +100,11 @@ def measure_gain(
     )
 
 
-def _fold(task: tuple[tuple[str, ...], Set, NDArray[np.bool_]]) -> _Fold:
-    tested, causes, held = task
-    problem = held_problem()
-    train = problem.take(~held)
-    found = search(train, tested, width=FOLD_WIDTH)
+def _fold(
+    problem: Problem, tested: tuple[str, ...], causes: Set, held: NDArray[np.bool_], workers: int
+) -> _Fold:
+    # Workers share one fold's search: three folds on two workers would leave one idle.
+    found = search(problem.take(~held), tested, width=FOLD_WIDTH, workers=workers)
     # What a verdict on these rows alone would report: in "unexplained", only what stands even so.
     chosen = judge(found).standing
     for size in range(len(SIZES)):

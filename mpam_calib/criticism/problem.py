@@ -110,12 +110,21 @@ class Problem:
         width = np.abs(x[n:] - x[:n])
         assert self.model.setting is not None
         long = width > LONG * self.model.setting.stroke
-        fast = np.flatnonzero(long | (width > FAST_SHARE * np.minimum(travel[n:], travel[:n])))
-        readings = Readings.join([self.middle(), self.readings.take(fast), self.readings.take(fast + n)])
-        first, second = np.arange(n), np.arange(n)
-        first[fast] = n + np.arange(len(fast))
-        second[fast] = n + len(fast) + np.arange(len(fast))
-        return readings, first, second
+        both = long | (width > FAST_SHARE * np.minimum(travel[n:], travel[:n]))
+        one, two = np.flatnonzero(~both), np.flatnonzero(both)
+        readings = Readings.join(
+            [self.middle().take(one), self.readings.take(two), self.readings.take(two + n)]
+        )
+        first = np.empty(n, dtype=np.intp)
+        first[one], first[two] = np.arange(len(one)), len(one) + np.arange(len(two))
+        return readings, first, np.where(both, first + len(two), first)
+
+    def at_lean(self, rows: Array) -> Array:
+        """What the rows (n,) say at the lean readings, (m,)."""
+        readings, first, second = self.lean
+        result = np.empty(len(readings))
+        result[first], result[second] = rows, rows
+        return result
 
     @cached_property
     def bow(self) -> Array:
@@ -143,9 +152,7 @@ class Problem:
         eta = linalg.solve(X.T @ X + np.eye(X.shape[1]), X.T @ residual) if X.shape[1] else np.zeros(0)
         whole = fixed + columns @ eta
         readings, first, second = self.lean
-        guide = np.empty(len(readings))
-        guide[:n], guide[first], guide[second] = self.force, self.force, self.force
-        fixed, columns = at(readings, guide)
+        fixed, columns = at(readings, self.at_lean(self.force))
         lean = fixed + columns @ eta
         return np.asarray(0.5 * (whole[:n] + whole[n:]) - 0.5 * (lean[first] + lean[second]))
 

@@ -108,15 +108,22 @@ def bend_factor(
     factor = np.ones((1, 1))
     number = 0
     for driver, degree in bends.items():
-        v = np.clip(DRIVERS[driver](state, setting), -1.5, 1.5)
-        total = np.zeros((1, 1))
-        before, here = np.ones_like(v), v
-        for j in range(1, degree + 1):
-            number += 1
-            total = total + values[f"{name}{BENDS}{number}"] * here
-            before, here = here, ((2 * j + 1) * v * here - j * before) / (j + 1)
+        v = np.atleast_2d(np.clip(DRIVERS[driver](state, setting), -1.5, 1.5))
+        c = [values[f"{name}{BENDS}{number + j}"] for j in range(1, degree + 1)]
+        number += degree
+        total = _series(c, v)
         if driver in POLYNOMIAL:
             factor = factor * (1.0 + total)
         else:
             log = log + total
     return np.asarray(factor * np.exp(np.clip(log, -MOST, MOST)))
+
+
+def _series(coefficients: list[Array], v: Array) -> Array:
+    """Σ c_j P_j(v), (B, n), of Legendre polynomials from the first on; c_j (B, 1), v (B or 1, n)."""
+    basis = [v]
+    for j in range(1, len(coefficients)):
+        basis.append(((2 * j + 1) * v * basis[-1] - j * (basis[-2] if j > 1 else 1.0)) / (j + 1))
+    if len(v) == 1:  # alike for all: one product of matrices
+        return np.asarray(np.concatenate(coefficients, axis=1) @ np.concatenate(basis))
+    return np.asarray(sum(c * p for c, p in zip(coefficients, basis, strict=True)))
