@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
+from scipy.linalg import lapack
 
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.bend import BENDS
@@ -99,46 +99,44 @@ class Climb:
     def look(self, u: Array, guide: Array, eta: Array) -> Place:
         """Linearise at u; ``eta`` (p,) serves where the force depends on itself."""
         problem, p = self.problem, self.chain.linear_size
-        _, first, second = problem.lean
+        readings, first, second = problem.lean
+        points, guides, nudge = u + self._offsets, guide, NUDGE * problem.force_scale
         if self.chain.uses_force:
-            nudge = NUDGE * problem.force_scale
-            fixed, columns = self._terms(
-                u + np.concatenate([self._offsets, self._offsets[:1]]),
-                _nudged(guide, len(self._offsets) + 1, nudge),
-            )
+            points = np.concatenate([points, points[:1]])
+            guides = _nudged(guide, len(points), nudge)
+        fixed, slope, columns = self.chain.factored(self.values(points), readings, guides)
+        factor = np.ones(1)
+        if self.chain.uses_force:
             # A force that depends on itself, F = f(F): one Newton step of its fixed point, for all at once.
-            slope = (fixed[-1] - fixed[0] + (columns[-1] - columns[0]) @ eta) / nudge
-            factor = 1.0 / np.clip(1.0 - slope, 0.2, 5.0)
-            fixed = guide + (fixed[:-1] - guide) * factor
-            columns = columns[:-1] * factor[:, None]
-        else:
-            fixed, columns = self._terms(u + self._offsets, guide)
-        whole, whole_columns = fixed[0], columns[0]
-        fixed = 0.5 * (fixed[:, first] + fixed[:, second]) + problem.bow
-        columns = 0.5 * (columns[:, first] + columns[:, second])
-        white = problem.white(np.column_stack([problem.force - fixed[0], columns[0]]), self.size)
+            force = fixed + slope * (columns @ eta)
+            factor = 1.0 / np.clip(1.0 - (force[-1] - force[0]) / nudge, 0.2, 5.0)
+
+        def rows(lean: Array) -> Array:
+            return 0.5 * (lean.take(first, axis=-1) + lean.take(second, axis=-1))
+
+        here = guide + (fixed[0] - guide) * factor
+        per_eta = rows(factor * slope[0] * columns[0].T).T
+        white = problem.white(
+            np.column_stack([problem.force - (rows(here) + problem.bow), per_eta]), self.size
+        )
         X = np.concatenate([white[:, 1:], self._extra], axis=1)
         # Given the sizes, the linear coordinates' optimum is exact.
-        gram = X.T @ X + np.eye(X.shape[1])
-        best = np.asarray(linalg.solve(gram, X.T @ white[:, 0], assume_a="pos")) if len(gram) else np.zeros(0)
+        best = _solve(X.T @ X + np.eye(X.shape[1]), X.T @ white[:, 0])
         residual = white[:, 0] - X @ best
-        moved = (fixed[1:] - fixed[0]) + (columns[1:] - columns[0]) @ best[:p]
+        force = guide + (fixed + slope * (columns @ best[:p]) - guide) * factor
+        force = np.broadcast_to(force, (len(points), len(readings)))[: len(u) + 1]
+        whole = rows(force) + problem.bow
+        moved = whole[1:] - whole[0]
         objective = -0.5 * float(residual @ residual + u @ u + best @ best)
         return Place(
             u=u,
             eta=best,
             residual=residual,
             J=np.concatenate([problem.white(moved.T / STEP, self.size), X], axis=1),
-            force=fixed[0] + columns[0] @ best[:p],
-            guide=whole + whole_columns @ best[:p],
+            force=whole[0],
+            guide=force[0],
             objective=objective if np.isfinite(objective) else -np.inf,
         )
-
-    def _terms(self, u: Array, guide: Array) -> tuple[Array, Array]:
-        readings = self.problem.lean[0]
-        got = self.chain.terms(self.values(u), readings, guide)
-        fixed = np.broadcast_to(got.fixed, (len(u), len(readings)))
-        return fixed, np.broadcast_to(got.columns, (len(u), len(readings), self.chain.linear_size))
 
     @cached_property
     def _still(self) -> float:
@@ -224,7 +222,7 @@ class Climb:
             free[:d] = ((np.abs(best.u) < furthest) | (best.u * gradient[:d] < 0.0)) & (released | ~bends)
             damped = hessian[np.ix_(free, free)] + damping * np.diag(np.diagonal(hessian)[free])
             step = np.zeros(len(hessian))
-            step[free] = linalg.solve(damped, gradient[free], assume_a="pos")
+            step[free] = _solve(damped, gradient[free])
             promise = 0.5 * float(step @ gradient)
             left = misfit - 2.0 * len(self.problem)
             if d == 0 or (promise < max(CONVERGED, SHARE * left) and not waiting and released):
@@ -236,6 +234,19 @@ class Climb:
             u = np.clip(best.u + step[:d], -furthest, furthest)
         assert best is not None
         return best
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    """x (k,) of matrix (k, k, positive definite)·x = right; LAPACK's own routine: most of the rest is checks.
+
+    Raises ``numpy.linalg.LinAlgError`` where the matrix is not positive definite.
+    """
+    if not len(right):
+        return np.zeros(0)
+    _, found, info = lapack.dposv(matrix, right)
+    if info != 0:
+        raise np.linalg.LinAlgError("a climb's matrix is not positive definite")
+    return np.asarray(found)
 
 
 def _nudged(guide: Array, copies: int, nudge: float) -> Array:

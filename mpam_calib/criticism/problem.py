@@ -14,10 +14,11 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, sparse
+from scipy import linalg
 
 from mpam_calib.criticism.noise_level import NoiseLevel, noise_level
 from mpam_calib.criticism.rows import Rows, saturated, telling_points, telling_strokes, without
+from mpam_calib.criticism.whitening import Whitening
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.noise import grown
@@ -47,8 +48,6 @@ ALIKE = 0.9
 FORCE_MAP_NOISE = 0.003
 """Noise of a static reading as a share of the force scale, where no sensor sd is declared."""
 
-SPARSE = 0.1
-"""Share of a factor's entries below which it is worth leaving the others out."""
 INHERITED = ("model", "lean", "bow", "root", "axes", "spreads", "log_dets")
 """What other forces do not change, or hardly."""
 
@@ -58,8 +57,9 @@ class Problem:
     """Reduced rows (n,): two Gauss points each in ``readings`` (2n), ``force`` (N), and where they belong.
 
     ``level``, ``cycle`` and ``stroke`` (n,) group the rows; ``noise`` (n, n) is the covariance of the
-    readings' noise; ``kernel`` (n, n) the remainder's for size 1 N. ``saturated`` is the share of raw
-    readings at the end of the load cell's range (left out), ``rows`` holds the others.
+    readings' noise, of which ``tied`` (n, r) is the factor of what strokes share; ``kernel`` (n, n) the
+    remainder's for size 1 N. ``saturated`` is the share of raw readings at the end of the load cell's range
+    (left out), ``rows`` holds the others.
     """
 
     blueprint: Blueprint
@@ -69,6 +69,7 @@ class Problem:
     cycle: Ints
     stroke: Ints
     noise: Array
+    tied: Array
     kernel: Array
     noise_level: NoiseLevel
     has_clock: bool
@@ -167,6 +168,7 @@ class Problem:
             cycle=self.cycle[index],
             stroke=self.stroke[index],
             noise=self.noise[np.ix_(index, index)],
+            tied=self.tied[index],
             kernel=self.kernel[np.ix_(index, index)],
             rows=None,
         )
@@ -184,6 +186,7 @@ class Problem:
         made = replace(
             self,
             noise=scale**2 * self.noise,
+            tied=scale * self.tied,
             noise_level=replace(level, white=scale * level.white, correlated=scale * level.correlated),
         )
         made.__dict__.update({name: getattr(self, name) for name in ("model", "lean", "bow")})
@@ -201,20 +204,17 @@ class Problem:
     def white(self, columns: Array, size: int) -> Array:
         """Columns (n, ...) whitened by the covariance of SIZES[size].
 
-        Without a remainder strokes are apart, and sparse factors do; with one the axes serve all sizes.
+        Without a remainder strokes are nearly apart; with one the axes serve all sizes.
         """
         if size == 0:
-            return np.asarray(self.root @ columns)
-        result: Array = (self.axes[0] @ columns) / self.spreads[size].reshape(-1, *[1] * (columns.ndim - 1))
-        return result
+            return self.root @ columns
+        turned = self.axes[0] @ columns
+        return np.asarray(turned / self.spreads[size].reshape(-1, *[1] * (columns.ndim - 1)))
 
     @cached_property
-    def root(self) -> sparse.csr_array | Array:
-        """Inverse Cholesky factor (n, n) of the noise; dense where rests tie the strokes together."""
-        factor = linalg.cholesky(self.noise, lower=True)
-        inverse = linalg.solve_triangular(factor, np.eye(len(self)), lower=True)
-        thin = np.mean(np.abs(inverse) > 0.0) < SPARSE
-        return sparse.csr_array(inverse) if thin else np.ascontiguousarray(inverse)
+    def root(self) -> Whitening:
+        """What whitens the noise alone."""
+        return Whitening.build(self.noise, self.tied)
 
     @cached_property
     def axes(self) -> tuple[Array, Array, float]:
@@ -250,6 +250,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     parts: list[tuple[Readings, Readings, Array, Ints, Array]] = []
     noise: NoiseLevel | None = None
     blocks: list[Array] = []
+    ties: list[Array] = []
     loops, beyond = specimen.loops, 0.0
     if loops is not None:
         out = saturated(loops)
@@ -273,7 +274,9 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         larger = grown(np.array(noise.growth), bins.force[keep], scale)
         low, high = bins.readings.take(keep), bins.readings.take(keep + n)
         parts.append((low, high, bins.force[keep], bins.segment[keep], np.zeros(0)))
-        blocks.append(larger[:, None] * larger * full + _held(bins, keep))
+        own, shared = _held(bins, keep)
+        blocks.append(larger[:, None] * larger * full + own)
+        ties.append(shared)
     points = gather_points(specimen)
     if points is not None:
         keep, _ = telling_points(points)
@@ -282,6 +285,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         rows_of = points.readings.take(keep)
         parts.append((rows_of, rows_of, points.force[keep], np.full(len(keep), -1), np.zeros(0)))
         blocks.append(np.diag((sd * grown(np.array(noise.growth), points.force[keep], scale)) ** 2))
+        ties.append(np.zeros((len(keep), 2)))
     assert noise is not None
     low = Readings.join([part[0] for part in parts])
     high = Readings.join([part[1] for part in parts])
@@ -289,6 +293,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     levels = model.setting.levels
     level = np.abs(low.pressure[:, None] - levels).argmin(axis=1)
     level = np.where(low.level >= 0, low.level, level)
+    tied = np.concatenate(ties)
     problem = Problem(
         blueprint=blueprint,
         readings=Readings.join([low, high]),
@@ -296,7 +301,8 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         level=level,
         cycle=np.where(stroke >= 0, low.cycle, 0).astype(np.int64),
         stroke=stroke,
-        noise=np.asarray(linalg.block_diag(*blocks)),
+        noise=linalg.block_diag(*blocks) + tied @ tied.T,
+        tied=tied,
         kernel=np.zeros((0, 0)),
         noise_level=noise,
         has_clock=loops is not None,
@@ -306,9 +312,10 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     return replace(problem, kernel=_kernel(problem))
 
 
-def _held(bins: LoopBins, keep: Ints) -> Array:
-    """What these bins may be off by at rest (covariance, N²): their level's friction, alike in all strokes.
+def _held(bins: LoopBins, keep: Ints) -> tuple[Array, Array]:
+    """What these bins may be off by at rest: their level's friction, alike in all strokes.
 
+    Returns each stroke's own covariance (n, n), N², and a factor (n, 2), N, of what the strokes share.
     Where the crosshead stops for a while, friction holds, fades or creeps; no model of sliding knows which.
     """
     n = len(bins)
@@ -324,9 +331,9 @@ def _held(bins: LoopBins, keep: Ints) -> Array:
         friction = np.polynomial.Polynomial.fit(x[up], half, 1)(x)
         doubt[here] = (sign * friction * bins.rest)[here]
     doubt, sign, segment = doubt[keep], sign[keep], bins.segment[keep]
-    alike = np.where(segment[:, None] == segment, 1.0, ALIKE)
-    result: Array = doubt[:, None] * doubt * alike * (sign[:, None] == sign)
-    return result
+    shared = np.sqrt(ALIKE) * doubt[:, None] * (sign[:, None] == np.array([1.0, -1.0]))
+    together = (segment[:, None] == segment) & (sign[:, None] == sign)
+    return (1.0 - ALIKE) * doubt[:, None] * doubt * together, shared
 
 
 def _from_differences(force: Array, segment: Ints) -> float:
