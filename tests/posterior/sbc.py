@@ -15,7 +15,9 @@ from scipy import stats
 from threadpoolctl import threadpool_limits
 
 from mpam_calib.model.blueprint import Options, draw_blueprint
+from mpam_calib.model.noise import CORRELATED
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.draws import Draws, reported
 from mpam_calib.posterior.sampling import sample
 from mpam_calib.posterior.target import build_target, locate, predict_force
@@ -56,35 +58,36 @@ def simulate(made: Specimen, blueprint, rng: np.random.Generator):
     return u, eta, build.with_force(made, force + noise)
 
 
-def quantities(model, made: Specimen, u: Array, eta: Array) -> tuple[list[str], Array]:
+def quantities(target: Collapsed, made: Specimen, u: Array, eta: Array) -> tuple[list[str], Array]:
     """Everything reported, the joint log-likelihood and two predicted forces: (draws, quantities)."""
+    model = target.model
     values = model.values(u)
     listed = reported(model, Draws(u, values, eta, 1))
     force = predict_force(model, values, eta, PREDICTED)
-    likelihood = log_likelihood(model, made, values, eta)
+    likelihood = (of_bins if CORRELATED in values else of_rows)(target, made, values, eta)
     columns = [*(item.draws for item in listed), likelihood, force[:, 0], force[:, 1]]
     names = [*(item.name for item in listed), "log-likelihood", "force, loading", "force, unloading"]
     return names, np.stack(columns, axis=1)
 
 
-def log_likelihood(model, made: Specimen, values: dict[str, Array], eta: Array) -> Array:
-    """ln p(y | u, η) of the rows (draws,), stroke by stroke and with dense covariances."""
+def of_rows(target: Collapsed, made: Specimen, values: dict[str, Array], eta: Array) -> Array:
+    """ln p(y | u, η) of the rows (draws,) under white noise, of which bins lose nothing."""
     assert made.loops is not None
-    loops = made.loops
-    residual = loops.force_N - predict_force(model, values, eta, build.rows_of(loops))
-    found = np.zeros(len(residual))
-    for stroke in np.unique(loops.stroke):
-        rows = np.flatnonzero(loops.stroke == stroke)
-        covariance = values["noise_sd_N"][:, :, None] ** 2 * np.eye(len(rows))
-        if "noise_corr_sd_N" in values:
-            lag = np.abs(loops.time_s[rows][:, None] - loops.time_s[rows])
-            away = np.exp(-lag / values["noise_corr_time_s"][:, :, None])
-            covariance = covariance + values["noise_corr_sd_N"][:, :, None] ** 2 * away
-        root = np.linalg.cholesky(covariance)
-        white = np.linalg.solve(root, residual[:, rows, None])[..., 0]
-        found -= 0.5 * np.sum(white**2, axis=1)
-        found -= np.sum(np.log(np.diagonal(root, axis1=1, axis2=2)), axis=1)
-    return found
+    residual = made.loops.force_N - predict_force(target.model, values, eta, build.rows_of(made.loops))
+    sd = values["noise_sd_N"]
+    return stats.norm.logpdf(residual, scale=sd).sum(axis=1)
+
+
+def of_bins(target: Collapsed, made: Specimen, values: dict[str, Array], eta: Array) -> Array:
+    """The same of bins and their scatter, which is what a posterior of correlated noise is given.
+
+    Bayes' rule: ln p(y | u, η) = ln p(y | u) + ln p(η | u, y) − ln p(η). Rows know more of the noise than
+    bins do, so that their likelihood would rank the truth too high.
+    """
+    value, centre, factor = target._solve(values)
+    z = np.einsum("bkl,bk->bl", factor, eta) - centre
+    log_det = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+    return value + log_det - 0.5 * np.sum(z**2, axis=1) + 0.5 * np.sum(eta**2, axis=1)
 
 
 def replicate(
@@ -105,8 +108,8 @@ def replicate(
             for i in range(0, 10 * L, 50)
         ]
     )
-    names, truth = quantities(target.model, made, u, eta)
-    _, draws = quantities(target.model, made, drawn_u[:L], drawn_eta[:L])
+    names, truth = quantities(target, made, u, eta)
+    _, draws = quantities(target, made, drawn_u[:L], drawn_eta[:L])
     # The joint distance in normal coordinates: what narrows or shifts all parameters together shows here.
     joint = np.concatenate([drawn_u, drawn_eta], axis=1)
     true_joint = np.concatenate([u, eta], axis=1)

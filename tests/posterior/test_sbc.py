@@ -7,6 +7,7 @@ import pytest
 from model import build
 
 from mpam_calib.model.blueprint import Options
+from mpam_calib.posterior.target import build_target, locate
 
 from . import sbc
 
@@ -35,6 +36,19 @@ def test_ranks_of_truth_are_uniform_in_forty_replicates():
     assert len(names) == 10
     assert sbc.outside(names, ranks) == {}
     assert "joint distance" in sbc.outside(names, narrowed)
+
+
+def test_likelihood_of_bins_is_that_of_rows_where_bins_lose_nothing():
+    made, blueprint = sbc.design(*MODELS["strand friction"][:2])
+    rng = np.random.default_rng(8)
+    *_, made = sbc.simulate(made, blueprint, rng)
+    target, _ = locate(build_target(made, blueprint), rng)
+    u = 0.3 * rng.standard_normal((6, len(target.model.names)))
+    eta = 0.3 * rng.standard_normal((6, sum(target.model.linear_sizes)))
+    values = target.model.values(u)
+    rows, bins = (each(target, made, values, eta) for each in (sbc.of_rows, sbc.of_bins))
+    assert np.ptp(rows) > 10.0
+    np.testing.assert_allclose(bins, rows, rtol=1e-8)
 
 
 @pytest.mark.long
