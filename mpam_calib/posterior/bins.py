@@ -246,7 +246,9 @@ def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Ar
     before = np.where(turned, np.concatenate([[0.0], before[:-1]]), after)
     came_from = np.concatenate([[0.0], loops.displacement_m[last][:-1]])
     back = np.where(turned, direction * (loops.displacement_m[first] - came_from), 0.0)
-    since_turn = np.clip(0.5 * (after + before + back), 0.0, after + before)
+    # At a speed of its own on either side the way after the turn is v'·t' with v·t + v'·t' travelled in all.
+    share = after / np.maximum(after + before, 1e-15)
+    since_turn = np.clip(share * (2.0 * before + back), 0.0, 2.0 * after)
     travel = since_turn[segment] + np.abs(loops.displacement_m - loops.displacement_m[first][segment])
     run = np.cumsum(~same_level) - 1
     level_start = loops.time_s[first][~same_level]

@@ -19,6 +19,11 @@ STRAIGHT, HELD = 1.7, 0.3
 """Ratio of two doublings of depth above which a turn has straight sides (2; a sine has √2), and the share of
 its time that such a turn must be held to count as a hold."""
 
+SIDE = 4
+"""Rows at least on either side of a turn that tell where it is."""
+ZOOM, ZOOMS = 16, 3
+"""Half the number of places tried for a turn at once, and how often the search narrows."""
+
 
 def noise_sd(values: Floats) -> float:
     """Standard deviation of the white noise on a slowly moving signal, shape (rows,) (same unit).
@@ -105,8 +110,8 @@ def detect_branch(displacement: Floats, threshold: float, sd: float) -> Ints:
 def _turn(strokes: Floats, extreme: int, margin: float) -> int | None:
     """The first row after the turn between two strokes; None where the crosshead was held there.
 
-    A turn lies halfway between two passages of the same place: so even the rows next to it, where the
-    crosshead hardly moves, find their side.
+    It lies where the two strokes meet: so even the rows next to it, where the crosshead hardly moves, find
+    their side.
     """
     travel = np.abs(strokes - strokes[extreme])
     passages = []
@@ -126,10 +131,36 @@ def _turn(strokes: Floats, extreme: int, margin: float) -> int | None:
     straight = farther - far > STRAIGHT * (far - near)
     if straight and 2.0 * near - far > max(3.0, HELD * near):
         return None
-    first, second = (0.5 * (i + o) for i, o in passages[:2])
-    # Strokes of different speeds shift the middle in proportion to the depth.
-    middle = first if abs(first - second) < 0.75 else 2.0 * first - second
-    return int(np.clip(np.floor(middle) + 1, np.floor(passages[0][0]) + 1, np.ceil(passages[0][1])))
+    low, high = np.floor(passages[0][0]), np.ceil(passages[0][1])
+    first = max(min(int(passages[-1][0]), extreme - SIDE), 0)
+    last = min(max(int(passages[-1][1]) + 1, extreme + SIDE), len(strokes) - 1)
+    middle = first + _meeting(strokes[first : last + 1], low - first, high - first)
+    return int(np.clip(np.floor(middle) + 1, low + 1, high))
+
+
+def _meeting(values: Floats, low: float, high: float) -> float:
+    """Where (in rows, between ``low`` and ``high``) two strokes meet, each at a speed of its own.
+
+    Least squares of x = x_turn + k·|row − c|ᵖ with a k for either side, and p = 1 (a crosshead that turns at
+    full speed) or 2 (one that comes to rest): the fast stroke is nearer to the turn in time.
+    """
+    n = len(values)
+    rows = np.linspace(0.0, 1.0, n)
+    best, least = 0.5 * (low + high), np.inf
+    centre, width = best, high - low
+    for _ in range(ZOOMS):
+        tried = np.clip(np.linspace(centre - 0.5 * width, centre + 0.5 * width, 2 * ZOOM + 1), low, high)
+        away = rows - tried[:, None] / (n - 1)
+        for power in (1, 2):
+            before, after = np.maximum(-away, 0.0) ** power, np.maximum(away, 0.0) ** power
+            X = np.stack([np.ones_like(away), before, after], axis=-1)
+            turned = np.swapaxes(X, 1, 2)
+            k = np.linalg.solve(turned @ X + 1e-9 * np.eye(3), turned @ values[:, None])
+            left = np.sum((values - (X @ k)[..., 0]) ** 2, axis=1)
+            if left.min() < least:
+                best, least = float(tried[left.argmin()]), float(left.min())
+        centre, width = best, width / ZOOM
+    return best
 
 
 def _departure(stroke: Floats, margin: float) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from model import build
@@ -55,6 +57,17 @@ def test_travel_of_a_sudden_turn():
     made = build.loops((150.0,), 12.0, 12, cycles=2)
     travel = row_readings(made).travel
     assert travel[made.stroke == 2] == pytest.approx((np.arange(12) + 0.5) * 1e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize("phase", [0.1, 0.5, 0.8])
+def test_travel_of_a_turn_between_two_speeds(phase):
+    """The slow stroke's last reading is ``phase`` of its step before the turn."""
+    slow, fast, n = 1e-4, 5e-4, 20
+    before = slow * (np.arange(n)[::-1] + phase)
+    after = fast * (np.arange(n) + 1.0 - phase)
+    made = build.loops((150.0,), 12.0, n, cycles=1)
+    made = replace(made, displacement_m=np.concatenate([0.012 - before, 0.012 - after]))
+    assert row_readings(made).travel[n:] == pytest.approx(after, rel=1e-9)
 
 
 @pytest.mark.parametrize("rows", [12, 40, 300])

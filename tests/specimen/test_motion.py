@@ -65,6 +65,27 @@ def test_branch_of_nearly_every_row(name: str, seed: int) -> None:
     assert per_turn <= 2 + rows_in_noise
 
 
+@pytest.mark.parametrize("rows", [15, 100, 400])
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 5.0])
+@pytest.mark.parametrize("gentle", [False, True])
+def test_strokes_of_different_speeds_meet_at_their_turn(gentle: bool, ratio: float, rows: int) -> None:
+    """Slow, fast and slow cycles at full speed into the turn or gently; 5 turns each, no noise."""
+    rng = np.random.default_rng(3)
+    wrong = []
+    for _ in range(20):
+        time = 20.0 / np.repeat([1.0, ratio, 1.0], 2)
+        ends = np.concatenate([[0.0], np.cumsum(time)])
+        t = np.arange(rng.uniform(0.0, 1.0), ends[-1] * ratio * rows / 20.0) * 20.0 / (ratio * rows)
+        t = t[t < ends[-1]]
+        number = np.searchsorted(ends, t, side="right") - 1
+        share = (t - ends[number]) / time[number]
+        way = 0.5 * (1.0 - np.cos(np.pi * share)) if gentle else share
+        x = 20.0 * np.where(number % 2 == 0, way, 1.0 - way)
+        found = detect_branch(x, turn_threshold(x), noise_sd(x))
+        wrong.append(np.count_nonzero(found != np.where(number % 2 == 0, -1, 1)))
+    assert np.mean(wrong) / 5 < 0.05
+
+
 def test_rows_before_the_first_motion_have_no_branch() -> None:
     x = np.concatenate([np.zeros(300), np.linspace(0.0, 10.0, 500)])
     found = detect_branch(x, turn_threshold(x), noise_sd(x))
