@@ -21,10 +21,13 @@ from mpam_calib.specimen.recording import Loops
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-WINDOW, DEGREE = 32, 3
-"""Windows of at most so many rows, detrended by a polynomial of this degree ..."""
+WINDOW, DEGREE, HIGHEST = 32, 3, 6
+"""Windows of at most so many rows, detrended by a polynomial of the first degree, or of up to the second
+where the curve itself would pass for noise ..."""
 SHORT_DEGREE = 5
 """... or of this one, where a stroke is so short that it is one window."""
+LEFT = 1.15
+"""Times the noise that a higher degree leaves up to which a lower one is believed: it tells more."""
 COMES_BACK = 0.6
 """Share of the scatter inside strokes below which that between repeated strokes is believed."""
 USUAL = 4.0
@@ -51,13 +54,20 @@ class NoiseLevel:
 def noise_level(loops: Loops, model: Model) -> NoiseLevel | None:
     """Posterior mode of the noise under the model's priors; None where the strokes are too short to tell.
 
-    A ripple of the drive is as fast as noise, but comes back: where strokes that repeat each other differ
-    by much less than each scatters, their differences are the noise.
+    What a polynomial leaves of a window is noise and the muscle's own curve: the lowest degree is taken that
+    leaves hardly more than higher ones. A ripple of the drive is as fast as noise, but comes back: where
+    strokes that repeat each other differ by much less than each scatters, their differences are the noise.
     """
-    windows = noise_windows(loops)
-    if windows is None:
+    windows = [w for degree in range(DEGREE, HIGHEST + 1) if (w := noise_windows(loops, degree)) is not None]
+    if not windows:
         return None
-    found = _mode(windows, loops.averaged, model)
+    every = [_mode(w, loops.averaged, model) for w in windows]
+    scale = 1.0 if model.setting is None else model.setting.force_scale
+    typical = [
+        each.total * float(np.mean(grown(np.array(each.growth), w.force, scale)))
+        for each, w in zip(every, windows, strict=True)
+    ]
+    found = next(each for each, size in zip(every, typical, strict=True) if size <= LEFT * min(typical))
     pairs = _between_cycles(loops)
     if pairs is not None:
         between = _mode(pairs, loops.averaged, model)
@@ -133,11 +143,17 @@ class Windows(NamedTuple):
         return self.chunks.T @ self.chunks, len(self.chunks), self.contrast, self.dt
 
 
-def noise_windows(loops: Loops) -> Windows | None:
-    """Detrended windows of consecutive rows inside strokes, away from their ends."""
+def noise_windows(loops: Loops, degree: int = DEGREE) -> Windows | None:
+    """Detrended windows of consecutive rows inside strokes, away from their ends; None where there are none.
+
+    Where strokes are too short for any degree, those that repeat each other are compared, or each is one
+    window.
+    """
     first, length = _strokes(loops)
     typical = int(np.median(length))
-    size, degree, margin = min(WINDOW, typical // 4), DEGREE, max(min(WINDOW, typical // 4) // 4, 2)
+    size, margin = min(WINDOW, typical // 4), max(min(WINDOW, typical // 4) // 4, 2)
+    if size < degree + 3 and degree > DEGREE:
+        return None
     if size < DEGREE + 4 and (found := _between_cycles(loops)) is not None:
         return found
     if size < DEGREE + 4:

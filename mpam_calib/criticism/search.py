@@ -36,6 +36,8 @@ BENT = 2.0
 parts is not to come close to causes that follow theirs."""
 WIDTH = 6
 """Sets of each size that are extended further."""
+LEADING_SHARE = 3
+"""One in so many of these is extended by every effect."""
 PARTNERS = 8
 """Best single effects that are tried as partners of every kept set."""
 LARGEST = 3
@@ -218,6 +220,8 @@ def search(
                 found.refit_all((frozenset(pair), 0) for pair in combinations(tested, 2))
             tell(0.2 if k == 2 else 0.65)
             tries = {s | {p} for s in kept for p in _partners(found, s, best) if p not in s}
+            # A straight line along what a cause does alone may miss what it does beside others.
+            tries |= {s | {p} for s in kept[: width // LEADING_SHARE] for p in tested if p not in s}
             for size in (0, 1):
                 found.refit_all((effects, size) for effects in sorted(tries, key=sorted))
             tell(0.4 if k == 2 else 0.8)
