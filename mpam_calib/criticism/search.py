@@ -231,11 +231,14 @@ def search(
             _polish(found, kept)
         for turn in range(2):
             tell(0.9 + 0.05 * turn)
+            # One cause of the best set may stand in for another that no kept set led to.
+            first = found.sets[0]
+            found.refit_all((first - {e} | {p}, 0) for e in sorted(first) for p in tested if p not in first)
             # A leader's own parts must have been looked at, or it could hide a passenger.
             leaders = found.sets[:LEADERS]
             parts = [frozenset(p) for s in leaders for p in combinations(sorted(s), max(len(s) - 1, 0))]
             for size in every:
-                found.refit_all((effects, size) for effects in parts)
+                found.refit_all((effects, size) for effects in [*parts, *leaders])
             _polish(found, [*parts, *leaders])
         found.doubt()
     found.spread = Alone(problem)
