@@ -103,7 +103,7 @@ def test_every_curve_of_another_author(identifier: str, name: str) -> None:
     assert left(identifier, name) < WORSE.get((identifier, name), NATS)
 
 
-def test_no_set_of_cases_uses_them() -> None:
+def test_neither_develop_nor_locked_uses_them() -> None:
     names = {(f.id, f.name) for f in textbook.FORMS}
     for half in (sets.DEVELOP_HALF, sets.LOCKED_HALF):
         assert not names & {(i, n) for i, forms in half.other.items() for n in forms}

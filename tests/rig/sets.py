@@ -1,7 +1,8 @@
-"""The two disjoint sets of cases: DEVELOP to work with, LOCKED to be scored.
+"""The sets of cases: DEVELOP and PRACTICE to work with, LOCKED to be scored.
 
-They share no seed, no family of muscles, no outside structure and no "other" form of an effect; only the
-textbook ("shared") forms occur in both. Everything is drawn from `random.Random`, whose stream is the same on
+DEVELOP and LOCKED share no seed, no family of muscles, no outside structure and no "other" form of an effect;
+only the textbook ("shared") forms occur in both. PRACTICE has develop's muscles and the curves of
+`effects.textbook`, which neither has. Everything is drawn from `random.Random`, whose stream is the same on
 every machine; `digest` pins the declaration.
 """
 
@@ -10,11 +11,11 @@ from __future__ import annotations
 import hashlib
 import json
 import random
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any
 
-from .effects import IDS, shared_form
+from .effects import IDS, forms_of, shared_form, textbook
 from .recipes import Recipe, Wanted
 
 HISTORY_AND_RIG = (
@@ -105,6 +106,17 @@ LOCKED_HALF = Half(
     ("notch", "gear", "stick_slip", "snag", "dropouts", "hum", "jump", "compress", "quantisation"),
     {"null": 66, "separable": 120, "inseparable": 40, "outside": 40},
 )
+
+PRACTICE_HALF = replace(
+    DEVELOP_HALF,
+    name="practice",
+    seed=777,
+    other={
+        i: tuple(f.name for f in forms_of(i) if f in textbook.FORMS) or (shared_form(i).name,) for i in IDS
+    },
+    counts={"separable": 60},
+)
+"""Develop's muscles with the curves that other authors would as soon have written."""
 
 
 def _wanted(half: Half, rng: random.Random, effect: str, low: float, high: float) -> Wanted:
@@ -257,8 +269,8 @@ def _outside(half: Half, rng: random.Random, index: int) -> Recipe:
 
 @cache
 def recipes(name: str) -> tuple[Recipe, ...]:
-    """All recipes of "develop" or "locked"."""
-    half = {"develop": DEVELOP_HALF, "locked": LOCKED_HALF}[name]
+    """All recipes of "develop", "practice" or "locked"."""
+    half = {half.name: half for half in (DEVELOP_HALF, PRACTICE_HALF, LOCKED_HALF)}[name]
     makers = {"null": _null, "separable": _separable, "inseparable": _inseparable, "outside": _outside}
     made = []
     for group, count in half.counts.items():

@@ -299,7 +299,15 @@ def test_the_locked_set_is_locked() -> None:
     assert digest("locked") == LOCKED_SHA256
 
 
-@pytest.mark.parametrize("name", ["develop", "locked"])
+def test_practice_has_curves_of_its_own() -> None:
+    practice, locked = recipes("practice"), recipes("locked")
+    assert not {r.seed for r in practice} & {r.seed for r in locked}
+    used = [{(w.id, w.form) for r in s for w in r.effects} for s in (practice, locked, recipes("develop"))]
+    assert all(FORMS[pair].shared for pair in used[0] & (used[1] | used[2]))
+    assert sum(not FORMS[pair].shared for pair in used[0]) > 20
+
+
+@pytest.mark.parametrize("name", ["develop", "practice", "locked"])
 def test_kept_margins_belong_to_the_set(name: str) -> None:
     kept = read_margins(name)
     assert list(kept) == [r.name for r in recipes(name)]

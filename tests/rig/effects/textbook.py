@@ -1,4 +1,4 @@
-"""Alternatives to the textbook forms, in neither set of cases: which shapes can a catalogue hold?
+"""Alternatives to the textbook forms, in the practice set alone: which shapes can a catalogue hold?
 
 Each is a curve that another author would as soon have written: hyperbolic instead of exponential, the
 square of the stroke instead of the stroke, a drift that comes back.
