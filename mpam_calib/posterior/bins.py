@@ -29,6 +29,8 @@ CHUNK = 32
 """At most so many consecutive readings of a bin tell of the fast noise."""
 AT_REST = 0.06
 """Up to this share of its stroke's largest speed the crosshead is at rest."""
+DEAD_STOP = 0.2
+"""Under way with at least this share of it on one side and at rest on the other: a dead stop."""
 REST_BINS = 0.2
 """Bins of a stroke's rest, at most, for each one of its motion."""
 SLACK_SHARE = 0.2
@@ -291,7 +293,12 @@ def _speed(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array,
     edge = (inward != 0) & (reach > 0)
     gentle = 1.5 * between(rows, one) - 0.5 * between(one, two)
     local = np.where(edge, np.clip(gentle, 0.2 * local, 2.0 * local), local)
-    rest = local <= AT_REST * np.maximum.reduceat(local, first)[segment]
+    fastest = np.maximum.reduceat(local, first)[segment]
+    # In the corner of a dead stop the mean of both sides is a speed that the crosshead never had.
+    sides = np.stack([between(before, rows), between(rows, after)])
+    inner = (before < rows) & (rows < after)
+    corner = inner & (sides.min(axis=0) <= AT_REST * fastest) & (sides.max(axis=0) >= DEAD_STOP * fastest)
+    rest = (local <= AT_REST * fastest) | corner
     moving = np.maximum(np.add.reduceat((~rest).astype(np.float64), first), 1.0)
     typical = np.add.reduceat(np.where(rest, 0.0, local), first) / moving
     return np.where(rest, typical[segment], local), rest
