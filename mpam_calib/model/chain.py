@@ -109,7 +109,7 @@ class Chain:
         fixed, columns = self._statics(state, shape, values)
         state = self._to_sensor(state, values)
         slope = state.gain * coulomb_factor(state.friction_gain * state.coulomb, state.sign, np.sign(known))
-        return slope * fixed + self._strand_force(state) + state.zero, slope, columns
+        return slope * fixed + self._friction_beside(state) + state.zero, slope, columns
 
     def force(self, values: Values, eta: Array, readings: Readings) -> Array:
         """Force (B, n), N, for coordinates η (B, p): exact; by secants where it depends on itself."""
@@ -138,7 +138,7 @@ class Chain:
         state = self._to_sensor(state, values)
         free = state.gain * free
         friction = state.friction_gain * state.coulomb * np.abs(free) * state.sign
-        return np.asarray(free + friction + self._strand_force(state) + state.zero)
+        return np.asarray(free + friction + self._friction_beside(state) + state.zero)
 
     def _to_shape(self, values: Values, readings: Readings, guide: Array) -> tuple[State, Shape]:
         state = self.start(readings, guide)
@@ -171,12 +171,14 @@ class Chain:
             state = self._stage(stage, state, values)
         return state
 
-    def _strand_force(self, state: State) -> Array:
+    def _friction_beside(self, state: State) -> Array:
+        """Friction (N) beside what is in proportion to the force; history acts on it as on the force."""
         braid = self.setting.braid
-        if braid is None or not np.any(state.strand):
-            return np.zeros(1)
-        unit = strand_friction_per_f_s(state.pressure, state.length, state.rest, braid.E_br, braid.nu_s)
-        result: Array = state.friction_gain * state.strand * state.sign * unit
+        force = state.drag
+        if braid is not None and np.any(state.strand):
+            unit = strand_friction_per_f_s(state.pressure, state.length, state.rest, braid.E_br, braid.nu_s)
+            force = force + state.friction_gain * state.strand * unit
+        result: Array = state.gain * state.sign * force
         return result
 
     def _stage(self, stage: Stage, state: State, values: Values) -> State:
@@ -204,6 +206,7 @@ class Chain:
             sign=readings.sign[None, :],
             coulomb=zero,
             strand=zero,
+            drag=zero,
             friction_gain=one,
             wall_gain=one,
             gain=one,

@@ -57,7 +57,8 @@ class State:
     shape: ``rest``, ``kinematics``, ``swell`` (factor on the radius's growth), the working ``length`` (m)
     and, once solved, the ``shape``.
     statics: ``wall_factor`` on the thickness term, ``lost`` (N) to be subtracted.
-    friction: ``sign`` s (fractions while it turns over), ``coulomb`` K and ``strand`` f_s.
+    friction: ``sign`` s (fractions while it turns over), ``coulomb`` K and ``strand`` f_s, both times
+    ``friction_gain``, and ``drag`` (N), the same at any force and pressure.
     history: ``wall_gain`` on the bladder's stress and ``gain`` on the whole force.
     sensor: ``zero`` (N), added to the reading.
     """
@@ -76,6 +77,7 @@ class State:
     sign: Array
     coulomb: Array
     strand: Array
+    drag: Array
     friction_gain: Array
     wall_gain: Array
     gain: Array

@@ -150,9 +150,36 @@ def test_friction_in_proportion_to_speed_does_not_know_the_force() -> None:
     start = replace(Chain(setting, None, False).start(readings, np.zeros(1)), coulomb=np.array([[0.05]]))
     moved = effect(form).apply(start, {"rate_per_decade": np.array([[0.4]])}, setting)
     per_decade = 0.4 * 0.05 * setting.force_scale
-    expected = readings.sign * per_decade * readings.speed / setting.speed / np.log(10.0)
-    np.testing.assert_allclose(moved.zero[0], expected, rtol=1e-12)
+    expected = per_decade * readings.speed / setting.speed / np.log(10.0)
+    np.testing.assert_allclose(moved.drag[0], expected, rtol=1e-12)
     assert moved.friction_gain is start.friction_gain
+
+
+@pytest.mark.parametrize("beside", [(), ("rate_friction:viscous",)])
+@pytest.mark.parametrize("friction", ["coulomb", "strand"])
+@pytest.mark.parametrize("form", ["creep", "stress_softening:force"])
+def test_history_acts_on_the_whole_force(form: str, friction: str, beside: tuple[str, ...]) -> None:
+    """The chain's fifth stage comes after friction: every kind of it relaxes and softens like the rest."""
+
+    def setting_of(effects: tuple[str, ...]) -> Setting:
+        declared = {"law": "constant", "order": 2, "effects": effects, "friction": friction}
+        setting = build.blueprint(declared).setting()
+        assert setting is not None
+        return replace(setting, duration=100.0, level_time=40.0, speed=1e-3)
+
+    plain, aged = setting_of(beside), setting_of((*beside, form))
+    readings, eta = rows(plain), np.zeros((1, 0))
+    values = {**values_of(aged, form, 1.0, 0.0), "rate_per_decade": np.array([[0.4]])}
+    force = Chain(plain, None, False).force(values, eta, readings)
+    smooth = Chain(plain, None, False).force(
+        values | dict.fromkeys(("K_f", "f_s"), np.zeros((1, 1))), eta, readings
+    )
+    assert np.max(np.abs(force - smooth)) > 0.1
+    gain = effect(form).apply(Chain(aged, None, False).start(readings, np.zeros(1)), values, aged).gain
+    assert np.ptp(gain) > 0.01
+    np.testing.assert_allclose(
+        Chain(aged, None, False).force(values, eta, readings), gain * force, rtol=1e-12
+    )
 
 
 def test_a_drift_that_settles_ends_where_the_straight_one_does() -> None:

@@ -38,7 +38,7 @@ def _viscous(state: State, values: Values, setting: Setting) -> State:
         unit = strand_friction_per_f_s(top, state.rest.L0, state.rest, braid.E_br, braid.nu_s)
         at_scale = at_scale + state.strand * unit
     added = values["rate_per_decade"] * at_scale * (speed / setting.speed) / np.log(10.0)
-    return replace(state, zero=state.zero + state.sign * added)
+    return replace(state, drag=state.drag + added)
 
 
 register(
