@@ -15,14 +15,16 @@ NOISE_SDS = 10.0
 LEAVE_SDS = 7.0
 """A hold is over once the crosshead is this many standard deviations away from it."""
 
-STRAIGHT, HELD = 1.7, 0.3
-"""Ratio of two doublings of depth above which a turn has straight sides (2; a sine has √2), and the share of
-its time that such a turn must be held to count as a hold."""
-
 SIDE = 4
 """Rows at least on either side of a turn that tell where it is."""
-ZOOM, ZOOMS = 16, 3
-"""Half the number of places tried for a turn at once, and how often the search narrows."""
+WINDOW = 96
+"""Rows around a turn, at most, that are looked at one by one; of more, means of as many."""
+PLACES, ZOOMS = 17, 4
+"""Places tried at once for a hold's beginning and for its end, and how often the search narrows."""
+SHORTEST, SURE = 1.0, 20.0
+"""Rows that a hold lasts at least, and twice the log likelihood by which it must fit better than none."""
+TINY = 1e-12
+"""Share of a window's range that passes for an exact fit."""
 
 
 def noise_sd(values: Floats) -> float:
@@ -108,74 +110,90 @@ def detect_branch(displacement: Floats, threshold: float, sd: float) -> Ints:
 
 
 def _turn(strokes: Floats, extreme: int, margin: float) -> int | None:
-    """The first row after the turn between two strokes; None where the crosshead was held there.
+    """The first row after the turn between two strokes; None where the crosshead was held there for long.
 
-    It lies where the two strokes meet: so even the rows next to it, where the crosshead hardly moves, find
-    their side.
+    It lies where the two strokes meet, or at the end of the hold between them: so even the rows next to it,
+    where the crosshead hardly moves, find their side.
     """
     travel = np.abs(strokes - strokes[extreme])
-    passages = []
-    for depth in (1.5 * margin, 3.0 * margin, 6.0 * margin):  # a long hold wanders over one
-        inbound = np.flatnonzero(travel[:extreme] > depth)
-        outbound = np.flatnonzero(travel[extreme:] > depth)
-        if not len(inbound) or not len(outbound):
-            return None
-        i, o = int(inbound[-1]), extreme + int(outbound[0])
-        passages.append(
-            (
-                i + (travel[i] - depth) / max(travel[i] - travel[i + 1], 1e-12),
-                o - (travel[o] - depth) / max(travel[o] - travel[o - 1], 1e-12),
-            )
-        )
-    near, far, farther = (o - i for i, o in passages)
-    straight = farther - far > STRAIGHT * (far - near)
-    if straight and 2.0 * near - far > max(3.0, HELD * near):
+    ways = (np.flatnonzero(travel[:extreme] > depth * margin) for depth in (1.5, 6.0))
+    back = (extreme + np.flatnonzero(travel[extreme:] > depth * margin) for depth in (1.5, 6.0))
+    ends = [(int(i[-1]), int(o[0])) for i, o in zip(ways, back, strict=True) if len(i) and len(o)]
+    if len(ends) < 2:
         return None
-    low, high = np.floor(passages[0][0]), np.ceil(passages[0][1])
-    first = max(min(int(passages[-1][0]), extreme - SIDE), 0)
-    last = min(max(int(passages[-1][1]) + 1, extreme + SIDE), len(strokes) - 1)
-    middle = first + _meeting(strokes[first : last + 1], low - first, high - first)
-    return int(np.clip(np.floor(middle) + 1, low + 1, high))
+    (low, high), (far, farther) = ends
+    first, last = max(min(far, extreme - SIDE), 0), min(max(farther, extreme + SIDE), len(strokes) - 1)
+    merged = -(-(last + 1 - first) // WINDOW)
+    if merged > 1:
+        count = (last + 1 - first) // merged
+        values = strokes[first : first + count * merged].reshape(count, merged).mean(axis=1)
+    else:
+        values = strokes[first : last + 1]
+
+    def within(row: int) -> float:
+        return (row - first - 0.5 * (merged - 1)) / merged
+
+    begin, end = _rest(values, within(low), within(high))
+    if merged > 1 and end > begin:
+        return None
+    found = first + 0.5 * (merged - 1) + merged * end
+    return int(np.clip(np.floor(found) + 1, low + 1, high))
 
 
-def _meeting(values: Floats, low: float, high: float) -> float:
-    """Where (in rows, between ``low`` and ``high``) two strokes meet, each at a speed of its own.
+def _rest(values: Floats, low: float, high: float) -> tuple[float, float]:
+    """Where (in rows, between ``low`` and ``high``) one stroke comes to rest and where the next one leaves.
 
-    Least squares of x = x_turn + k·|row − c|ᵖ with a k for either side, and p = 1 (a crosshead that turns at
-    full speed) or 2 (one that comes to rest): the fast stroke is nearer to the turn in time.
+    Least squares of x = x_turn + k·|row − begin|ᵖ before and k'·|row − end|ᵖ after, with p = 1 (full speed
+    into the turn and out of it) or 2 (gently). Both are one place, the turn, unless a hold between them fits
+    surely better.
     """
     n = len(values)
-    rows = np.linspace(0.0, 1.0, n)
-    best, least = 0.5 * (low + high), np.inf
-    centre, width = best, high - low
+    met, least = _search(values, low, high, held=False)
+    held, lower = _search(values, low, high, held=True)
+    floor = (TINY * float(np.ptp(values))) ** 2 * n
+    better = n * np.log((least + floor) / (lower + floor))
+    return held if held[1] - held[0] >= SHORTEST and better > SURE else met
+
+
+def _search(values: Floats, low: float, high: float, *, held: bool) -> tuple[tuple[float, float], float]:
+    """The best (begin, end) of :func:`_rest` and the sum of squares that it leaves."""
+    rows = np.arange(len(values), dtype=np.float64)
+    span = max(len(values) - 1, 1)
+    one, two = np.triu_indices(PLACES) if held else (np.arange(2 * PLACES),) * 2
+    share = np.linspace(-0.5, 0.5, PLACES if held else 2 * PLACES)
+    best, least, width = (0.5 * (low + high),) * 2, np.inf, high - low
     for _ in range(ZOOMS):
-        tried = np.clip(np.linspace(centre - 0.5 * width, centre + 0.5 * width, 2 * ZOOM + 1), low, high)
-        away = rows - tried[:, None] / (n - 1)
+        begin, end = np.clip(
+            np.stack([best[0] + width * share[one], best[1] + width * share[two]]), low, high
+        )
+        end = np.maximum(begin, end)
+        before = np.maximum(begin[:, None] - rows, 0.0) / span
+        after = np.maximum(rows - end[:, None], 0.0) / span
         for power in (1, 2):
-            before, after = np.maximum(-away, 0.0) ** power, np.maximum(away, 0.0) ** power
-            X = np.stack([np.ones_like(away), before, after], axis=-1)
+            X = np.stack([np.ones_like(before), before**power, after**power], axis=-1)
             turned = np.swapaxes(X, 1, 2)
             k = np.linalg.solve(turned @ X + 1e-9 * np.eye(3), turned @ values[:, None])
             left = np.sum((values - (X @ k)[..., 0]) ** 2, axis=1)
-            if left.min() < least:
-                best, least = float(tried[left.argmin()]), float(left.min())
-        centre, width = best, width / ZOOM
-    return best
+            i = int(left.argmin())
+            if left[i] < least:
+                best, least = (float(begin[i]), float(end[i])), float(left[i])
+        width = 3.0 * width / PLACES
+    return best, least
 
 
 def _departure(stroke: Floats, margin: float) -> int:
-    """The row at which a stroke leaves the hold at its beginning.
+    """The row at which a stroke leaves the hold at its beginning, because the noise hides the first steps.
 
-    Found by extending the motion between one and two margins from the hold back to it, because the
-    noise hides the first steps.
+    Found where the motion between one and two margins away, at full speed or gently begun, meets the hold.
     """
     travel = np.abs(stroke - stroke[0])
     far = min(2.0 * margin, 0.9 * float(travel[-1]))
-    near = 0.5 * far
-    at_near = int(np.flatnonzero(travel <= near)[-1])
-    at_far = int(np.flatnonzero(travel <= far)[-1])
-    start = at_near - (at_far - at_near) * near / (far - near)
-    return 1 + int(np.clip(round(start), 0, at_near))
+    at_near, at_far = (int(np.flatnonzero(travel <= depth)[-1]) for depth in (0.5 * far, far))
+    last = min(max(at_far + 1, at_near + SIDE), len(stroke) - 1)
+    # Gently begun, the way to one margin takes 2.4 times as long as from there to two.
+    first = max(at_near - 4 * (last - at_near), 0)
+    ((start, _), _) = _search(travel[first : last + 1], 0.0, float(at_near + 1 - first), held=False)
+    return int(np.clip(np.floor(first + start) + 1, 0, at_near + 1))
 
 
 def run_ids(*labels: Ints) -> Ints:

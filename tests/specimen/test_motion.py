@@ -86,6 +86,32 @@ def test_strokes_of_different_speeds_meet_at_their_turn(gentle: bool, ratio: flo
     assert np.mean(wrong) / 5 < 0.05
 
 
+@pytest.mark.parametrize("rows", [15, 40, 100, 400])
+@pytest.mark.parametrize("ratio", [1.0, 5.0])
+@pytest.mark.parametrize("gentle", [False, True])
+def test_a_hold_goes_with_the_stroke_before_it(gentle: bool, ratio: float, rows: int) -> None:
+    """Holds of a tenth to a quarter of a slow stroke, reached and left at full speed or gently; no noise.
+
+    ``rows`` are those of a fast stroke. What is left are readings at the end of a hold, from which a gentle
+    crosshead has not moved yet.
+    """
+    rng = np.random.default_rng(3)
+    wrong = []
+    for _ in range(10):
+        time = 20.0 / np.repeat([1.0, ratio, 1.0], 2)
+        hold = rng.uniform(2.0, 5.0)
+        ends = np.concatenate([[0.0], np.cumsum(time + hold)])
+        step = 20.0 / (ratio * rows)
+        t = np.arange(rng.uniform(0.0, step), ends[-1], step)
+        number = np.searchsorted(ends, t, side="right") - 1
+        share = np.minimum((t - ends[number]) / time[number], 1.0)
+        way = 0.5 * (1.0 - np.cos(np.pi * share)) if gentle else share
+        x = np.round(20.0 * np.where(number % 2 == 0, way, 1.0 - way), 3)
+        found = detect_branch(x, turn_threshold(x), noise_sd(x))
+        wrong.append(np.count_nonzero(found != np.where(number % 2 == 0, -1, 1)))
+    assert np.mean(wrong) / 5 < 0.3
+
+
 def test_rows_before_the_first_motion_have_no_branch() -> None:
     x = np.concatenate([np.zeros(300), np.linspace(0.0, 10.0, 500)])
     found = detect_branch(x, turn_threshold(x), noise_sd(x))
