@@ -43,8 +43,9 @@ PRESSURE_LENGTH = 0.08
 """Distance in pressure (share of the top level) over which the remainder changes."""
 LONG, FAST_SHARE = 0.04, 0.3
 """A row longer than this share of the stroke, or of its way since the turn, is looked at in two places."""
-ALIKE = 0.9
-"""How alike the rests of two strokes are."""
+ALIKE, APART = 0.9, 0.5
+"""How alike the rests of two strokes are, and the share of what is left that every bin of a rest has by
+itself: friction fades on the way into a rest, and in it."""
 FORCE_MAP_NOISE = 0.003
 """Noise of a static reading as a share of the force scale, where no sensor sd is declared."""
 
@@ -332,8 +333,9 @@ def _held(bins: LoopBins, keep: Ints) -> tuple[Array, Array]:
         doubt[here] = (sign * friction * bins.rest)[here]
     doubt, sign, segment = doubt[keep], sign[keep], bins.segment[keep]
     shared = np.sqrt(ALIKE) * doubt[:, None] * (sign[:, None] == np.array([1.0, -1.0]))
-    together = (segment[:, None] == segment) & (sign[:, None] == sign)
-    return (1.0 - ALIKE) * doubt[:, None] * doubt * together, shared
+    together = (1.0 - APART) * ((segment[:, None] == segment) & (sign[:, None] == sign))
+    own = (1.0 - ALIKE) * doubt[:, None] * doubt * (together + APART * np.eye(len(doubt)))
+    return own, shared
 
 
 def _from_differences(force: Array, segment: Ints) -> float:

@@ -243,14 +243,17 @@ def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Ar
     direction = np.sign(loops.displacement_m[last] - loops.displacement_m[first])
     turned = same_level & opposite
     # The turn lies between two readings: what was travelled between them lies on either side of it.
-    after = _half_step(loops.displacement_m, first, np.minimum(first + 2, last), direction)
-    before = _half_step(loops.displacement_m, last, np.maximum(last - 2, first), -direction)
-    before = np.where(turned, np.concatenate([[0.0], before[:-1]]), after)
+    way_in = _half_step(loops.displacement_m, last, np.maximum(last - 2, first), -direction)
+    way_out = _half_step(loops.displacement_m, first, np.minimum(first + 2, last), direction)
+    speed_in = 2.0 * way_in / _step(loops.time_s, np.maximum(last - 2, first), last)
+    speed_out = 2.0 * way_out / _step(loops.time_s, first, np.minimum(first + 2, last))
+    speed_in = np.concatenate([[0.0], speed_in[:-1]])
+    gap = np.concatenate([[0.0], loops.time_s[first][1:] - loops.time_s[last][:-1]])
     came_from = np.concatenate([[0.0], loops.displacement_m[last][:-1]])
-    back = np.where(turned, direction * (loops.displacement_m[first] - came_from), 0.0)
+    back = direction * (loops.displacement_m[first] - came_from)
     # At a speed of its own on either side the way after the turn is v'·t' with v·t + v'·t' travelled in all.
-    share = after / np.maximum(after + before, 1e-15)
-    since_turn = np.clip(share * (2.0 * before + back), 0.0, 2.0 * after)
+    share = speed_out / np.maximum(speed_in + speed_out, 1e-15)
+    since_turn = np.where(turned, np.clip(share * (speed_in * gap + back), 0.0, 2.0 * way_out), way_out)
     travel = since_turn[segment] + np.abs(loops.displacement_m - loops.displacement_m[first][segment])
     run = np.cumsum(~same_level) - 1
     level_start = loops.time_s[first][~same_level]
@@ -268,6 +271,11 @@ def _half_step(displacement: Array, end: Ints, inner: Ints, direction: Array) ->
     near = direction * (displacement[middle] - displacement[end])
     far = direction * (displacement[inner] - displacement[middle])
     return np.asarray(0.5 * np.clip(near + 0.75 * (near - far), 0.0, np.maximum(far, near)))
+
+
+def _step(time: Array, first: Ints, last: Ints) -> Array:
+    """Mean time (strokes,) from one row to the next between two rows, s."""
+    return np.maximum((time[last] - time[first]) / np.maximum(last - first, 1), 1e-9)
 
 
 def _speed(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array, NDArray[np.bool_]]:

@@ -70,6 +70,20 @@ def test_travel_of_a_turn_between_two_speeds(phase):
     assert row_readings(made).travel[n:] == pytest.approx(after, rel=1e-9)
 
 
+@pytest.mark.parametrize("phase", [0.1, 0.5, 0.8])
+def test_travel_where_the_rate_of_readings_changes_at_the_turn(phase):
+    """The fast stroke is read three times as often as the slow one, and begins its readings anew."""
+    slow, fast, n = 1e-4, 5e-4, 20
+    t_in, t_out = np.arange(n)[::-1] + phase, (np.arange(n) + 0.25) / 3.0
+    made = build.loops((150.0,), 12.0, n, cycles=1)
+    made = replace(
+        made,
+        displacement_m=np.concatenate([0.012 - slow * t_in, 0.012 - fast * t_out]),
+        time_s=np.concatenate([n - t_in, n + t_out]),
+    )
+    assert row_readings(made).travel[n:] == pytest.approx(fast * t_out, rel=1e-9)
+
+
 @pytest.mark.parametrize("rows", [12, 40, 300])
 def test_speed_follows_the_motion(rows):
     """To 5 % of the largest speed everywhere, the readings next to a turn included."""
