@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
-from mpam_calib.posterior.bins import row_readings
 from mpam_calib.posterior.points import Points
+from mpam_calib.posterior.row_motion import row_readings
 from mpam_calib.specimen.recording import Loops
 
 Array = NDArray[np.float64]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.row_motion import history, row_readings, speeds
 from mpam_calib.posterior.white import Nodes
 from mpam_calib.specimen.recording import Loops
 
@@ -27,10 +28,6 @@ UNREDUCED = 16
 """Strokes of up to so many readings are left as they are."""
 CHUNK = 32
 """At most so many consecutive readings of a bin tell of the fast noise."""
-AT_REST = 0.06
-"""Up to this share of its stroke's largest speed the crosshead is at rest."""
-DEAD_STOP = 0.2
-"""Under way with at least this share of it on one side and at rest on the other: a dead stop."""
 REST_BINS = 0.2
 """Bins of a stroke's rest, at most, for each one of its motion."""
 SLACK_SHARE = 0.2
@@ -112,7 +109,7 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
     """Reduce loops (rows in time order) to about ``most`` bins a stroke."""
     stroke_starts = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
     lengths = np.diff(np.append(stroke_starts, len(loops.stroke)))
-    speed, rest = _speed(
+    speed, rest = speeds(
         loops, stroke_starts, stroke_starts + lengths - 1, np.repeat(np.arange(len(lengths)), lengths)
     )
     per_stroke = [_edges(part, most) for part in np.split(rest, stroke_starts[1:])]
@@ -129,7 +126,7 @@ def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
     row_bin = np.repeat(np.arange(len(starts)), stops - starts)
     spread = np.sqrt(mean((loops.displacement_m - displacement[row_bin]) ** 2))
     direction = np.where(loops.branch[starts] == -1, 1.0, -1.0)
-    travel, reversal, at_level = _history(loops, stroke_starts, lengths)
+    travel, reversal, at_level = history(loops, stroke_starts, lengths)
     # A bin that comes to rest has the speed of its moving part.
     weight = np.where(rest, 1e-9, 1.0)
 
@@ -208,108 +205,6 @@ def _wider(starts: Ints, segment: Ints, position: Ints, most: int) -> Ints:
     full = np.bincount(segment)[segment] > most
     kept = ~full | (position <= len(FINE)) | ((position - len(FINE)) % 2 == 1)
     return np.asarray(starts[kept])
-
-
-def row_readings(loops: Loops) -> Readings:
-    """Every row of the loops as a reading, unreduced."""
-    first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
-    lengths = np.diff(np.append(first, len(loops.stroke)))
-    segment = np.repeat(np.arange(len(first)), lengths)
-    travel, reversal, at_level = _history(loops, first, lengths)
-    return Readings(
-        pressure=loops.pressure_Pa,
-        displacement=loops.displacement_m,
-        sign=np.where(np.abs(loops.branch) == 1, loops.branch, 0).astype(np.float64),
-        level=loops.level,
-        time=loops.time_s,
-        time_at_level=at_level,
-        cycle=loops.cycle.astype(np.float64),
-        travel=travel,
-        reversal=reversal[segment],
-        speed=_speed(loops, first, first + lengths - 1, segment)[0],
-    )
-
-
-def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array]:
-    """Travel since the turn (rows), whether a reversal began the stroke, time at the level (rows)."""
-    segment = np.repeat(np.arange(len(first)), lengths)
-    same_level = np.zeros(len(first), dtype=bool)
-    same_level[1:] = (loops.level[first][1:] == loops.level[first][:-1]) & (
-        loops.clock[first][1:] == loops.clock[first][:-1]
-    )
-    opposite = np.zeros(len(first), dtype=bool)
-    opposite[1:] = loops.branch[first][1:] == -loops.branch[first][:-1]
-    last = first + lengths - 1
-    direction = np.sign(loops.displacement_m[last] - loops.displacement_m[first])
-    turned = same_level & opposite
-    # The turn lies between two readings: what was travelled between them lies on either side of it.
-    way_in = _half_step(loops.displacement_m, last, np.maximum(last - 2, first), -direction)
-    way_out = _half_step(loops.displacement_m, first, np.minimum(first + 2, last), direction)
-    speed_in = 2.0 * way_in / _step(loops.time_s, np.maximum(last - 2, first), last)
-    speed_out = 2.0 * way_out / _step(loops.time_s, first, np.minimum(first + 2, last))
-    speed_in = np.concatenate([[0.0], speed_in[:-1]])
-    gap = np.concatenate([[0.0], loops.time_s[first][1:] - loops.time_s[last][:-1]])
-    came_from = np.concatenate([[0.0], loops.displacement_m[last][:-1]])
-    back = direction * (loops.displacement_m[first] - came_from)
-    # At a speed of its own on either side the way after the turn is v'·t' with v·t + v'·t' travelled in all.
-    share = speed_out / np.maximum(speed_in + speed_out, 1e-15)
-    since_turn = np.where(turned, np.clip(share * (speed_in * gap + back), 0.0, 2.0 * way_out), way_out)
-    travel = since_turn[segment] + np.abs(loops.displacement_m - loops.displacement_m[first][segment])
-    run = np.cumsum(~same_level) - 1
-    level_start = loops.time_s[first][~same_level]
-    at_level = loops.time_s - level_start[run][segment]
-    return travel, (same_level & opposite).astype(np.float64), at_level
-
-
-def _half_step(displacement: Array, end: Ints, inner: Ints, direction: Array) -> Array:
-    """Way (strokes,) travelled in the half step beyond the row ``end`` of each stroke, m.
-
-    The speed there goes on changing as it did over the two steps to the row ``inner``: a crosshead that comes
-    to rest gently travels less than one that turns at full speed.
-    """
-    middle = (end + inner) // 2
-    near = direction * (displacement[middle] - displacement[end])
-    far = direction * (displacement[inner] - displacement[middle])
-    return np.asarray(0.5 * np.clip(near + 0.75 * (near - far), 0.0, np.maximum(far, near)))
-
-
-def _step(time: Array, first: Ints, last: Ints) -> Array:
-    """Mean time (strokes,) from one row to the next between two rows, s."""
-    return np.maximum((time[last] - time[first]) / np.maximum(last - first, 1), 1e-9)
-
-
-def _speed(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array, NDArray[np.bool_]]:
-    """Speed at every row (m/s), over a fortieth of the rows under way to either side; whether it is at rest.
-
-    At rest the speed is the one that the stroke otherwise has: friction does not vanish with the motion.
-    """
-    rows = np.arange(len(segment))
-    low, high = (f.reduceat(loops.displacement_m, first)[segment] for f in (np.minimum, np.maximum))
-    inside = np.minimum(loops.displacement_m - low, high - loops.displacement_m) > 0.005 * (high - low)
-    window = np.maximum(np.add.reduceat(inside.astype(np.int64), first) // 40, 1)[segment]
-    before, after = np.maximum(rows - window, first[segment]), np.minimum(rows + window, last[segment])
-
-    def between(one: Ints, other: Ints) -> Array:
-        elapsed = np.maximum(np.abs(loops.time_s[other] - loops.time_s[one]), 1e-9)
-        return np.asarray(np.abs(loops.displacement_m[other] - loops.displacement_m[one]) / elapsed)
-
-    local = between(before, after)
-    # Next to a turn only one side is known: the speed there is not the mean of what follows.
-    inward = np.where(rows - first[segment] < window, 1, np.where(last[segment] - rows < window, -1, 0))
-    reach = np.minimum(window, (last - first)[segment] // 2)
-    one, two = rows + inward * reach, rows + 2 * inward * reach
-    edge = (inward != 0) & (reach > 0)
-    gentle = 1.5 * between(rows, one) - 0.5 * between(one, two)
-    local = np.where(edge, np.clip(gentle, 0.2 * local, 2.0 * local), local)
-    fastest = np.maximum.reduceat(local, first)[segment]
-    # In the corner of a dead stop the mean of both sides is a speed that the crosshead never had.
-    sides = np.stack([between(before, rows), between(rows, after)])
-    inner = (before < rows) & (rows < after)
-    corner = inner & (sides.min(axis=0) <= AT_REST * fastest) & (sides.max(axis=0) >= DEAD_STOP * fastest)
-    rest = (local <= AT_REST * fastest) | corner
-    moving = np.maximum(np.add.reduceat((~rest).astype(np.float64), first), 1.0)
-    typical = np.add.reduceat(np.where(rest, 0.0, local), first) / moving
-    return np.where(rest, typical[segment], local), rest
 
 
 def _scatter(

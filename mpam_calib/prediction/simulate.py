@@ -14,7 +14,7 @@ from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.readings import Readings
-from mpam_calib.posterior.bins import row_readings
+from mpam_calib.posterior.row_motion import row_readings
 from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.curves import contraction_grid, first_root
 from mpam_calib.prediction.protocol import LEVELS, thesis_protocol

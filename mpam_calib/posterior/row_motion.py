@@ -1,0 +1,131 @@
+"""What every row of the loops knows of its motion: way since the turn, time at the level, speed, rest."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.model.readings import Readings
+from mpam_calib.specimen.recording import Loops
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+AT_REST = 0.06
+"""Up to this share of its stroke's largest speed the crosshead is at rest."""
+DEAD_STOP = 0.2
+"""Under way with at least this share of it on one side and at rest on the other: a dead stop."""
+
+
+def row_readings(loops: Loops) -> Readings:
+    """Every row of the loops as a reading, unreduced."""
+    first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
+    lengths = np.diff(np.append(first, len(loops.stroke)))
+    segment = np.repeat(np.arange(len(first)), lengths)
+    travel, reversal, at_level = history(loops, first, lengths)
+    return Readings(
+        pressure=loops.pressure_Pa,
+        displacement=loops.displacement_m,
+        sign=np.where(np.abs(loops.branch) == 1, loops.branch, 0).astype(np.float64),
+        level=loops.level,
+        time=loops.time_s,
+        time_at_level=at_level,
+        cycle=loops.cycle.astype(np.float64),
+        travel=travel,
+        reversal=reversal[segment],
+        speed=speeds(loops, first, first + lengths - 1, segment)[0],
+    )
+
+
+def history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array]:
+    """Travel since the turn (rows), whether a reversal began the stroke, time at the level (rows)."""
+    segment = np.repeat(np.arange(len(first)), lengths)
+    same_level = np.zeros(len(first), dtype=bool)
+    same_level[1:] = (loops.level[first][1:] == loops.level[first][:-1]) & (
+        loops.clock[first][1:] == loops.clock[first][:-1]
+    )
+    opposite = np.zeros(len(first), dtype=bool)
+    opposite[1:] = loops.branch[first][1:] == -loops.branch[first][:-1]
+    last = first + lengths - 1
+    direction = np.sign(loops.displacement_m[last] - loops.displacement_m[first])
+    turned = same_level & opposite
+    # The turn lies between two readings: what was travelled between them lies on either side of it.
+    way_in = _half_step(loops.displacement_m, last, np.maximum(last - 2, first), -direction)
+    way_out = _half_step(loops.displacement_m, first, np.minimum(first + 2, last), direction)
+    speed_in = 2.0 * way_in / _step(loops.time_s, np.maximum(last - 2, first), last)
+    speed_out = 2.0 * way_out / _step(loops.time_s, first, np.minimum(first + 2, last))
+    speed_in = np.concatenate([[0.0], speed_in[:-1]])
+    gap = np.concatenate([[0.0], loops.time_s[first][1:] - loops.time_s[last][:-1]])
+    came_from = np.concatenate([[0.0], loops.displacement_m[last][:-1]])
+    back = direction * (loops.displacement_m[first] - came_from)
+    # At a speed of its own on either side the way after the turn is v'·t' with v·t + v'·t' travelled in all.
+    share = speed_out / np.maximum(speed_in + speed_out, 1e-15)
+    since_turn = np.where(turned, np.clip(share * (speed_in * gap + back), 0.0, 2.0 * way_out), way_out)
+    travel = since_turn[segment] + np.abs(loops.displacement_m - loops.displacement_m[first][segment])
+    run = np.cumsum(~same_level) - 1
+    level_start = loops.time_s[first][~same_level]
+    at_level = loops.time_s - level_start[run][segment]
+    return travel, (same_level & opposite).astype(np.float64), at_level
+
+
+def _half_step(displacement: Array, end: Ints, inner: Ints, direction: Array) -> Array:
+    """Way (strokes,) travelled in the half step beyond the row ``end`` of each stroke, m.
+
+    The speed there goes on changing as it did over the two steps to the row ``inner``: a crosshead that comes
+    to rest gently travels less than one that turns at full speed.
+    """
+    middle = (end + inner) // 2
+    near = direction * (displacement[middle] - displacement[end])
+    far = direction * (displacement[inner] - displacement[middle])
+    return np.asarray(0.5 * np.clip(near + 0.75 * (near - far), 0.0, np.maximum(far, near)))
+
+
+def _step(time: Array, first: Ints, last: Ints) -> Array:
+    """Mean time (strokes,) from one row to the next between two rows, s."""
+    return np.asarray(np.maximum((time[last] - time[first]) / np.maximum(last - first, 1), 1e-9))
+
+
+def speeds(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array, NDArray[np.bool_]]:
+    """Speed at every row (m/s), over a fortieth of the rows under way to either side; whether it is at rest.
+
+    At rest the speed is the one that the stroke otherwise has: friction does not vanish with the motion.
+    """
+    rows = np.arange(len(segment))
+    low, high = (f.reduceat(loops.displacement_m, first)[segment] for f in (np.minimum, np.maximum))
+    inside = np.minimum(loops.displacement_m - low, high - loops.displacement_m) > 0.005 * (high - low)
+    window = np.maximum(np.add.reduceat(inside.astype(np.int64), first) // 40, 1)[segment]
+    local = _within(loops, window, first[segment], last[segment])
+    fastest = np.maximum.reduceat(local, first)[segment]
+    # In the corner of a dead stop the mean of both sides is a speed that the crosshead never had.
+    before, after = np.maximum(rows - window, first[segment]), np.minimum(rows + window, last[segment])
+    sides = np.stack([_between(loops, before, rows), _between(loops, rows, after)])
+    inner = (before < rows) & (rows < after)
+    corner = inner & (sides.min(axis=0) <= AT_REST * fastest) & (sides.max(axis=0) >= DEAD_STOP * fastest)
+    rest = (local <= AT_REST * fastest) | corner
+    # Nor is it the mean of motion and rest next to one.
+    changes = np.flatnonzero(np.diff(segment, prepend=-1) | np.diff(rest, prepend=rest[0]))
+    ends = np.append(changes[1:], len(rows)) - 1
+    run = np.cumsum(np.isin(rows, changes)) - 1
+    start, stop = changes[run], ends[run]
+    local = np.where(start < stop, _within(loops, window, start, stop), local)
+    moving = np.maximum(np.add.reduceat((~rest).astype(np.float64), first), 1.0)
+    typical = np.add.reduceat(np.where(rest, 0.0, local), first) / moving
+    return np.where(rest, typical[segment], local), rest
+
+
+def _within(loops: Loops, window: Ints, start: Ints, stop: Ints) -> Array:
+    """Speed (rows,) over ``window`` rows to either side, none beyond the rows ``start`` and ``stop``."""
+    rows = np.arange(len(window))
+    local = _between(loops, np.maximum(rows - window, start), np.minimum(rows + window, stop))
+    # Next to a turn only one side is known: the speed there is not the mean of what follows.
+    inward = np.where(rows - start < window, 1, np.where(stop - rows < window, -1, 0))
+    reach = np.minimum(window, np.where(inward > 0, stop - rows, rows - start) // 2)
+    one, two = rows + inward * reach, rows + 2 * inward * reach
+    gentle = 1.5 * _between(loops, rows, one) - 0.5 * _between(loops, one, two)
+    return np.where((inward != 0) & (reach > 0), np.clip(gentle, 0.2 * local, 2.0 * local), local)
+
+
+def _between(loops: Loops, one: Ints, other: Ints) -> Array:
+    """Mean speed (rows,) between two rows, m/s."""
+    elapsed = np.maximum(np.abs(loops.time_s[other] - loops.time_s[one]), 1e-9)
+    return np.asarray(np.abs(loops.displacement_m[other] - loops.displacement_m[one]) / elapsed)
