@@ -31,7 +31,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(EFFECT_IDS, ("bent",)),
     "dead_band": ("bent", "soft"),
     "rate_friction": ("bent", "viscous", "viscous-bent"),
-    "presliding": ("bent", "rest", "rest-bent"),
+    "presliding": ("bent", "rest", "ramp", "rest-bent", "ramp-bent"),
     "stress_softening": ("bent", "force", "force-bent"),
     "creep": ("bent", "wall", "wall-bent"),
     "force_drift": ("bent", "settling", "settling-bent"),

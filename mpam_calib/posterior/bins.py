@@ -96,7 +96,7 @@ def _edges(rest: NDArray[np.bool_], most: int) -> Ints:
     rows = float(weight.sum())
     bins = int(np.ceil(rows)) if rows <= min(UNREDUCED, most) else min(most, max(UNREDUCED, int(rows) // 4))
     fractions = np.arange(bins, dtype=np.float64)
-    if rows >= 8 * bins:
+    if rows >= 4 * bins:
         fractions = np.concatenate([[0.0], FINE, fractions[3:]])
     passed = np.concatenate([[0.0], np.cumsum(weight)])
     edges = np.round(np.interp(fractions / bins * rows, passed, np.arange(n + 1)))

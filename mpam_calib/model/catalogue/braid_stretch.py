@@ -32,7 +32,7 @@ register(
         parameters=_parameters,
         apply=_apply,
         needs_braid=True,
-        bends={"contraction": 1, "pressure": 1},
+        bends={"contraction": 1, "pressure": 2},
         looseness=2.0,
     )
 )

@@ -38,6 +38,6 @@ register(
         source="thesis Eq. 2.44",
         parameters=_parameters,
         apply=_apply,
-        bends={"force": 1, "pressure": 1, "contraction": 1},
+        bends={"force": 1, "pressure": 2, "contraction": 1},
     )
 )

@@ -43,7 +43,7 @@ register(
         apply=_apply,
         forms={"wall": _wall},
         kinds=("wall",),
-        bends={"level_time": 3},
+        bends={"level_time": 4},
         looseness=1.5,
     )
 )

@@ -47,6 +47,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"soft": _soft},
-        bends={"pressure": 2},
+        bends={"pressure": 3},
     )
 )

@@ -42,7 +42,7 @@ register(
         apply=_apply,
         forms={"settling": _settling},
         kinds=("settling",),
-        bends={"time": 4},
+        bends={"time": 5},
         looseness=4.0,
     )
 )

@@ -29,6 +29,6 @@ register(
         source="true shortening = reading + offset",
         parameters=_parameters,
         apply=_apply,
-        bends={"contraction": 1, "settling": 2},
+        bends={"contraction": 1, "settling": 3},
     )
 )

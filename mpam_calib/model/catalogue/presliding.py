@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, Parameter
 from mpam_calib.model.state import Setting, State
+
+Array = NDArray[np.float64]
+Apply = Callable[[State, Values, Setting], State]
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -16,18 +21,25 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("reversal_mm", prior, "travel over which friction turns over"),)
 
 
-def _apply(state: State, values: Values, setting: Setting) -> State:
-    # Every stroke begins with a turn: before a level's first one the muscle was pressurised, and moved.
-    readings = state.readings
-    turned = 1.0 - 2.0 * np.exp(-readings.travel / values["reversal_mm"])
-    return replace(state, sign=state.sign * turned)
+def _exponential(state: State, values: Values) -> Array:
+    """What is left to turn over after some travel, from 1 to 0: Dahl's model."""
+    return np.exp(-state.readings.travel / values["reversal_mm"])
 
 
-def _from_rest(state: State, values: Values, setting: Setting) -> State:
-    """A level's first stroke starts without friction, not against it."""
-    readings = state.readings
-    turned = 1.0 - (1.0 + readings.reversal) * np.exp(-readings.travel / values["reversal_mm"])
-    return replace(state, sign=state.sign * turned)
+def _ramp(state: State, values: Values) -> Array:
+    """The same in proportion to the travel, to its end: elastic up to full sliding."""
+    return np.maximum(1.0 - state.readings.travel / values["reversal_mm"], 0.0)
+
+
+def _turning(left: Callable[[State, Values], Array], *, from_rest: bool) -> Apply:
+    """Friction that turns over; a level's first stroke may start without it, not against it."""
+
+    def apply(state: State, values: Values, setting: Setting) -> State:
+        # Every stroke begins with a turn: before a level's first one the muscle was pressurised, and moved.
+        swing = 1.0 + state.readings.reversal if from_rest else 2.0
+        return replace(state, sign=state.sign * (1.0 - swing * left(state, values)))
+
+    return apply
 
 
 register(
@@ -39,9 +51,12 @@ register(
         told_by="small reversals in the middle of the stroke",
         source="Dahl's model at constant load: s(1 − 2 exp(−travel/reversal))",
         parameters=_parameters,
-        apply=_apply,
-        forms={"rest": _from_rest},
-        kinds=("rest",),
+        apply=_turning(_exponential, from_rest=False),
+        forms={
+            "rest": _turning(_exponential, from_rest=True),
+            "ramp": _turning(_ramp, from_rest=False),
+        },
+        kinds=("rest", "ramp"),
         bends={"travel": 3},
         looseness=2.0,
     )

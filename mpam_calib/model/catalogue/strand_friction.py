@@ -39,6 +39,6 @@ register(
         parameters=_parameters,
         apply=_apply,
         needs_braid=True,
-        bends={"pressure": 1, "contraction": 1},
+        bends={"pressure": 1, "contraction": 2},
     )
 )

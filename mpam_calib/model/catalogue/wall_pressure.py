@@ -27,6 +27,6 @@ register(
         source="thesis Eq. 2.9 (force balance, factor 0) against virtual work (factor 1)",
         parameters=_parameters,
         apply=_apply,
-        bends={"contraction": 1, "pressure": 1},
+        bends={"contraction": 2, "pressure": 2},
     )
 )
