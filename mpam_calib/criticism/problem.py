@@ -257,7 +257,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         out = saturated(loops)
         loops, beyond = without(loops, out), float(out.mean())
         looked_at = telling_strokes(loops)
-        bins = bin_loops(loops, int(np.clip(ROWS // len(looked_at), 8, 32)))
+        bins = bin_loops(loops, int(np.clip(ROWS // len(looked_at), 8, 32)), finest=1)
         n = len(bins)
         keep = np.flatnonzero(~bins.slack & np.isin(bins.segment, looked_at))
         noise = noise_level(loops, model)

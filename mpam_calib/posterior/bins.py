@@ -85,8 +85,8 @@ class LoopBins:
         return Readings(**{**low.__dict__, **both})
 
 
-def _edges(rest: NDArray[np.bool_], most: int) -> Ints:
-    """First rows of the bins of a stroke: about ``most``, with finer first ones.
+def _edges(rest: NDArray[np.bool_], most: int, finest: int) -> Ints:
+    """First rows of the bins of a stroke: about ``most``, with finer first ones of ``finest`` rows or more.
 
     Rows (n,) at rest count less: however long a stroke dwells, its motion keeps most of the bins.
     """
@@ -96,7 +96,7 @@ def _edges(rest: NDArray[np.bool_], most: int) -> Ints:
     rows = float(weight.sum())
     bins = int(np.ceil(rows)) if rows <= min(UNREDUCED, most) else min(most, max(UNREDUCED, int(rows) // 4))
     fractions = np.arange(bins, dtype=np.float64)
-    if rows >= 4 * bins:
+    if rows >= 4 * finest * bins:
         fractions = np.concatenate([[0.0], FINE, fractions[3:]])
     passed = np.concatenate([[0.0], np.cumsum(weight)])
     edges = np.round(np.interp(fractions / bins * rows, passed, np.arange(n + 1)))
@@ -105,14 +105,18 @@ def _edges(rest: NDArray[np.bool_], most: int) -> Ints:
     return np.unique(np.concatenate([edges, ends[ends < n]])).astype(np.int64)
 
 
-def bin_loops(loops: Loops, most: int = BINS) -> LoopBins:
-    """Reduce loops (rows in time order) to about ``most`` bins a stroke."""
+def bin_loops(loops: Loops, most: int = BINS, finest: int = 2) -> LoopBins:
+    """Reduce loops (rows in time order) to about ``most`` bins a stroke.
+
+    Those at its turn are finer where they keep ``finest`` rows: in bins of one row the encoder's noise may go
+    back and forth, and a covariance of such bins is no chain along the way.
+    """
     stroke_starts = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
     lengths = np.diff(np.append(stroke_starts, len(loops.stroke)))
     speed, rest = speeds(
         loops, stroke_starts, stroke_starts + lengths - 1, np.repeat(np.arange(len(lengths)), lengths)
     )
-    per_stroke = [_edges(part, most) for part in np.split(rest, stroke_starts[1:])]
+    per_stroke = [_edges(part, most, finest) for part in np.split(rest, stroke_starts[1:])]
     starts = np.concatenate([s + e for s, e in zip(stroke_starts, per_stroke, strict=True)])
     segment = np.repeat(np.arange(len(lengths)), [len(e) for e in per_stroke])
     position = np.concatenate([np.arange(len(e)) for e in per_stroke])

@@ -77,9 +77,9 @@ class Processes:
 
     def map(self, work: Callable[[Task], Found], tasks: Iterable[Task]) -> list[Found]:
         """All tasks at once; raises ``Interrupted`` where a process is killed."""
-        # Not the executor's own map, which at Ctrl-C cancels what is left: its thread stumbles over that.
-        waiting = [self.executor.submit(work, task) for task in tasks]
         try:
+            # Not the executor's own map, which at Ctrl-C cancels what is left: its thread stumbles over that.
+            waiting = [self.executor.submit(work, task) for task in tasks]
             return [future.result() for future in waiting]
         except BrokenProcessPool as error:
             raise Interrupted(
