@@ -79,7 +79,8 @@ def diagnose(
         def share_done(share: float) -> None:
             listener("measuring the gain", share)
 
-        gain = measure_gain(problem, tested.tested, verdict.standing, WORKERS, share_done)
+        named = found.fits[verdict.standing, found.best_size(verdict.standing)]
+        gain = measure_gain(problem, tested.tested, named, WORKERS, share_done)
     fits = [found.fits[s, found.best_size(s)] for s in (frozenset(), verdict.standing)]
     structure = list(zip(*(structure_tests(problem, f) for f in fits), strict=True))
     return Diagnosis(problem, tested, found, verdict, budget, gain, structure)

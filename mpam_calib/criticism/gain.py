@@ -19,7 +19,7 @@ from mpam_calib.criticism.candidates import HISTORY
 from mpam_calib.criticism.climb import STEP
 from mpam_calib.criticism.fit import Fit, chain_for, doubt_columns
 from mpam_calib.criticism.problem import SIZES, Problem
-from mpam_calib.criticism.search import Search, Set, search
+from mpam_calib.criticism.search import Search, Set, causes_of, search
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.model.blueprint import Blueprint
 
@@ -63,11 +63,15 @@ class _Fold:
 def measure_gain(
     problem: Problem,
     tested: tuple[str, ...],
-    causes: Set,
+    named: Fit,
     workers: int = 1,
     tell: Callable[[float], None] | None = None,
 ) -> Gain | None:
-    """The gain of naming causes; None where nothing can be held out. ``tell`` hears the share done."""
+    """The gain of the causes that were named, of which ``named`` is the fit to all rows.
+
+    None where nothing can be held out. ``tell`` hears the share done.
+    """
+    causes = causes_of(named)
     by_cycle = bool(causes & set(HISTORY)) and len(np.unique(problem.cycle)) > 2
     groups = problem.cycle if by_cycle else problem.level
     labels = np.unique(groups)
@@ -76,7 +80,7 @@ def measure_gain(
     parts = [labels[i::FOLDS] for i in range(min(FOLDS, len(labels)))]
     folds = []
     for part in parts:
-        folds.append(_fold(problem, tested, causes, np.isin(groups, part), workers))
+        folds.append(_fold(problem, tested, named, np.isin(groups, part), workers))
         if tell is not None:
             tell(len(folds) / len(parts))
     errors = [
@@ -101,17 +105,20 @@ def measure_gain(
 
 
 def _fold(
-    problem: Problem, tested: tuple[str, ...], causes: Set, held: NDArray[np.bool_], workers: int
+    problem: Problem, tested: tuple[str, ...], named: Fit, held: NDArray[np.bool_], workers: int
 ) -> _Fold:
     # Workers share one fold's search: three folds on two workers would leave one idle.
     found = search(problem.take(~held), tested, width=FOLD_WIDTH, workers=workers)
     # What a verdict on these rows alone would report: in "unexplained", only what stands even so.
     chosen = judge(found).standing
-    for size in range(len(SIZES)):
-        found.refit_all((effects, size) for effects in (chosen, causes))
-    named = causes if causes in found.sets else chosen  # no climb may have an end without these rows
+    found.refit_all((chosen, size) for size in range(len(SIZES)))
     index = (np.flatnonzero(~held), np.flatnonzero(held))
-    results = [_predict(problem, found, effects, index) for effects in (frozenset(), chosen, named)]
+    results = [_predict(problem, found, effects, index) for effects in (frozenset(), chosen)]
+    # A search that kept other sets may know these causes in the wrong forms alone.
+    found.refit_like(named)
+    causes = causes_of(named)
+    kept = causes if causes in found.sets else chosen  # no climb may have an end without these rows
+    results.append(_predict(problem, found, kept, index))
     residuals = [problem.force[held] - mean for mean, _ in results]
     covariances = [covariance for _, covariance in results]
     return _Fold(

@@ -96,6 +96,16 @@ class Search:
             if found is not None:
                 self.fits[key] = found
 
+    def refit_like(self, known: Fit) -> None:
+        """Refit a set beside every remainder in the forms, and from the end, of another fit of it, too."""
+        effects = causes_of(known)
+        tries = [(tuple(sorted(known.effects)), _ended(known))]
+        for size in range(len(SIZES)):
+            (found,) = self.spread(_best_of, [(size, tries, self.doubting)])
+            seen = self.fits.get((effects, size))
+            if found is not None and (seen is None or found.log_evidence > seen.log_evidence):
+                self.fits[effects, size] = found
+
     def _tries(self, effects: Set, size: int) -> list[Try]:
         """Forms and starts of a set's climbs."""
         near = next((f for s in (size - 1, size + 1) if (f := self.fits.get((effects, s)))), None)
@@ -179,6 +189,11 @@ class Search:
     def sets(self) -> list[Set]:
         """All sets seen, best first."""
         return sorted({key[0] for key in self.fits}, key=lambda s: -self.score(s))
+
+
+def causes_of(found: Fit) -> Set:
+    """The effects of a fit, whatever their forms."""
+    return frozenset(_forms(found))
 
 
 def _forms(found: Fit) -> dict[str, str]:

@@ -23,7 +23,7 @@ from rig.oracle import Oracle
 
 from mpam_calib.criticism.candidates import HISTORY, candidates
 from mpam_calib.criticism.gain import FOLDS, measure_gain
-from mpam_calib.criticism.problem import Problem, build_problem
+from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.search import search
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
@@ -72,8 +72,14 @@ def measure(recipe: recipes.Recipe) -> list[str] | None:
         return None
     problem = problem_of(specimen)
     tested = candidates(problem).tested
-    verdict = judge(search(problem, tested))
-    gain = measure_gain(problem, tested, verdict.standing) if verdict.standing else None
+    found = search(problem, tested)
+    verdict = judge(found)
+    if not verdict.standing:
+        return None
+    for size in range(len(SIZES)):
+        found.refit(verdict.standing, size)
+    named = found.fits[verdict.standing, found.best_size(verdict.standing)]
+    gain = measure_gain(problem, tested, named)
     if gain is None:
         return None
     by_cycle = gain.held_out == "cycle"

@@ -12,6 +12,8 @@ from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.fit import fit
 from mpam_calib.criticism.gain import Z90, predict_rows
 from mpam_calib.criticism.problem import SIZES, Problem
+from mpam_calib.criticism.search import Search
+from mpam_calib.criticism.spread import Alone
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +43,20 @@ def test_bands_hold_a_misfit_that_no_remainder_holds(null_problem: Problem, shar
     off = share * null_problem.force_scale * np.sum(amplitudes[null_problem.level] * waves, axis=1)
     wrong = replace(null_problem, force=null_problem.force + off)
     assert 0.8 <= covered(wrong, len(SIZES) - 1) <= 0.99
+
+
+def test_named_causes_are_refitted_in_the_forms_that_were_named(null_problem: Problem) -> None:
+    """A fold's search that kept other sets may know them in the wrong forms: the better fit is kept."""
+    causes = frozenset(["creep"])
+    relaxing = null_problem.force * (1.0 - 0.03 * np.log10(1.0 + null_problem.middle().time_at_level))
+    problem = replace(null_problem, force=relaxing)
+    plain, bent = (fit(problem, frozenset([form]), 0) for form in ("creep", "creep:wall-bent"))
+    assert plain.log_evidence > bent.log_evidence + 10.0
+    for known, before in ((plain, bent), (bent, plain)):
+        found = Search(problem, ("creep",), Alone(problem), fits={(causes, 0): before})
+        found.refit_like(known)
+        assert found.fits[causes, 0].effects == plain.effects
+        assert {size for _, size in found.fits} == set(range(len(SIZES)))
 
 
 def test_bands_are_no_wider_than_they_need_be(null_problem: Problem) -> None:
