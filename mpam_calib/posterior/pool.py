@@ -78,9 +78,7 @@ class Processes:
     def map(self, work: Callable[[Task], Found], tasks: Iterable[Task]) -> list[Found]:
         """All tasks at once; raises ``Interrupted`` where a process is killed."""
         try:
-            # Not the executor's own map, which at Ctrl-C cancels what is left: its thread stumbles over that.
-            waiting = [self.executor.submit(work, task) for task in tasks]
-            return [future.result() for future in waiting]
+            return list(self.executor.map(work, tasks))
         except BrokenProcessPool as error:
             raise Interrupted(
                 "interrupted: a worker process was killed (for want of memory?); what was drawn is kept, the "
