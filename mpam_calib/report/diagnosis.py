@@ -43,8 +43,9 @@ SENTENCES = {
 
 FORMS = (
     "These probabilities suppose that a rig's effects follow the catalogue's equations, bent ones too, "
-    "to a few per cent. On hidden test cases whose forms the catalogue does not have, sets stated at more "
-    "than 0.99 were the true ones in three of four. Try a named cause on the rig before you rely on it."
+    "to a few per cent. On hidden test cases sets stated at more than 0.99 were the true ones in four of "
+    "five, and in five of eight where a cause had a form that the catalogue does not have. Try a named cause "
+    "on the rig before you rely on it."
 )
 
 

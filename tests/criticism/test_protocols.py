@@ -51,12 +51,12 @@ SAMPLE = (
 )
 
 
-def _speaks(cause: str | None, friction: str, driven: str) -> bool:
+def _speaks(cause: str | None, driven: str) -> bool:
     """A cause of speed needs two, and the rig's own law changes sign where a crosshead nearly stands."""
     return cause != "rate_friction" or not ("gently" in driven or driven == "one speed")
 
 
-EVERY = [c for c in product(CAUSES, ("coulomb", "strand"), DRIVEN, WRITTEN) if _speaks(*c[:3])]
+EVERY = [c for c in product(CAUSES, ("coulomb", "strand"), DRIVEN, WRITTEN) if _speaks(c[0], c[2])]
 
 
 def _problem(one: rig_case.Case) -> Problem:
