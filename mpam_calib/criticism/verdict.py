@@ -16,6 +16,8 @@ Word = Literal["adequate", "named", "ambiguous", "unexplained"]
 
 SURE, LEAD = 0.95, 5.0
 """Probability that the named set holds, and nats by which it leads."""
+STANDS = 20.0
+"""The same for a cause beside structure that no set removes: odds of models that are known to be wrong."""
 LISTED = 5
 NOISE_SIZE = 0.5
 """A remainder whose root mean square is below this share of a reading's noise is at its level."""
@@ -104,7 +106,9 @@ def _repeating(found: Search, leading: Set, size: int) -> float:
 def _standing(found: Search, leading: Set) -> Set:
     """Causes of the leading set that stand beside the largest remainder, sure and by a clear margin.
 
-    A remainder that may hold anything is the fairest rival: what it can replace is no cause.
+    A remainder that may hold anything is the fairest rival: what it can replace is no cause. Where the fit is
+    worse than its noise even so, margins shrink in proportion (quasi-likelihood: McCullagh and Nelder 1989,
+    chapter 9).
     """
     largest = len(SIZES) - 1
     for e in leading:
@@ -113,11 +117,13 @@ def _standing(found: Search, leading: Set) -> Set:
         s: f.log_evidence + found.log_prior(s) for (s, size), f in found.fits.items() if size == largest
     }
     total = float(np.logaddexp.reduce(list(scores.values())))
+    first = max(scores, key=lambda s: scores[s])
+    worse = max(found.fits[first, largest].chi2 / len(found.problem), 1.0)
     standing = set()
     for e in leading:
         with_e = float(np.logaddexp.reduce([v for s, v in scores.items() if e in s]))
         without = max(v for s, v in scores.items() if e not in s)
         best = max(v for s, v in scores.items() if e in s)
-        if np.exp(with_e - total) >= SURE and best - without >= LEAD:
+        if np.exp(with_e - total) >= SURE and best - without >= STANDS * worse:
             standing.add(e)
     return frozenset(standing)

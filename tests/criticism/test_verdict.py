@@ -52,3 +52,29 @@ def test_a_cause_that_leaves_more_than_there_was_is_not(problem: Problem) -> Non
     assert np.argmax([found.score(s) for s in (NOTHING, CAUSE)]) == 1
     verdict = judge(found)
     assert (verdict.word, verdict.standing) == ("unexplained", NOTHING)
+
+
+def search_beside_a_remainder(problem: Problem, margin: float, misfit: float) -> Search:
+    """A search whose cause needs the largest remainder and leads by a margin (nats) beside it.
+
+    ``misfit`` is what the fits leave even so, whitened squares per row.
+    """
+    largest = len(SIZES) - 1
+    found = search_where_the_cause_leaves(problem, 0.9)
+    for (effects, size), fitted in list(found.fits.items()):
+        evidence = -100.0 * (size < largest) + (margin - found.log_prior(CAUSE)) * (effects == CAUSE)
+        found.fits[effects, size] = replace(fitted, log_evidence=evidence, chi2=misfit * len(problem))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("margin", "misfit", "stands"), [(15.0, 1.0, False), (30.0, 1.0, True), (30.0, 3.0, False), (90.0, 3.0, True)]
+)
+def test_a_cause_stands_beside_unexplained_structure_only_by_far(
+    problem: Problem, margin: float, misfit: float, stands: bool
+) -> None:
+    """And by the further, the more the fits leave beside noise and remainder."""
+    found = search_beside_a_remainder(problem, margin, misfit)
+    assert found.score(CAUSE) - found.score(NOTHING) == pytest.approx(margin)
+    verdict = judge(found)
+    assert (verdict.word, verdict.standing) == ("unexplained", CAUSE if stands else NOTHING)
