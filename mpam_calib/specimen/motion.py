@@ -159,25 +159,28 @@ def _search(values: Floats, low: float, high: float, *, held: bool) -> tuple[tup
     """The best (begin, end) of :func:`_rest` and the sum of squares that it leaves."""
     rows = np.arange(len(values), dtype=np.float64)
     span = max(len(values) - 1, 1)
-    one, two = np.triu_indices(PLACES) if held else (np.arange(2 * PLACES),) * 2
+    one, two = np.divmod(np.arange(PLACES**2), PLACES) if held else (np.arange(2 * PLACES),) * 2
     share = np.linspace(-0.5, 0.5, PLACES if held else 2 * PLACES)
-    best, least, width = (0.5 * (low + high),) * 2, np.inf, high - low
-    for _ in range(ZOOMS):
-        begin, end = np.clip(
-            np.stack([best[0] + width * share[one], best[1] + width * share[two]]), low, high
-        )
-        end = np.maximum(begin, end)
-        before = np.maximum(begin[:, None] - rows, 0.0) / span
-        after = np.maximum(rows - end[:, None], 0.0) / span
-        for power in (1, 2):
+    best, least = (0.5 * (low + high),) * 2, np.inf
+    for power in (1, 2):  # each on its own: on a coarse grid the wrong one may look better
+        place, reached, width = (0.5 * (low + high),) * 2, np.inf, high - low
+        for _ in range(ZOOMS):
+            begin, end = np.clip(
+                np.stack([place[0] + width * share[one], place[1] + width * share[two]]), low, high
+            )
+            end = np.maximum(begin, end)
+            before = np.maximum(begin[:, None] - rows, 0.0) / span
+            after = np.maximum(rows - end[:, None], 0.0) / span
             X = np.stack([np.ones_like(before), before**power, after**power], axis=-1)
             turned = np.swapaxes(X, 1, 2)
             k = np.linalg.solve(turned @ X + 1e-9 * np.eye(3), turned @ values[:, None])
             left = np.sum((values - (X @ k)[..., 0]) ** 2, axis=1)
             i = int(left.argmin())
-            if left[i] < least:
-                best, least = (float(begin[i]), float(end[i])), float(left[i])
-        width = 3.0 * width / PLACES
+            if left[i] < reached:
+                place, reached = (float(begin[i]), float(end[i])), float(left[i])
+            width = 3.0 * width / PLACES
+        if reached < least:
+            best, least = place, reached
     return best, least
 
 

@@ -112,6 +112,20 @@ def test_a_hold_goes_with_the_stroke_before_it(gentle: bool, ratio: float, rows:
     assert np.mean(wrong) / 5 < 0.3
 
 
+def test_a_hold_ends_at_its_last_row_however_the_encoder_rustles() -> None:
+    """Reached and left halfway between two rows at full speed; noise of a ten-thousandth of the stroke."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        strokes, truth = [], []
+        for number, rows in enumerate(np.repeat(rng.integers(9, 16) * np.array([1, 5, 1]), 2)):
+            way = np.concatenate([(np.arange(rows) + 0.5) / rows, np.ones(20)])
+            strokes.append(27.0 * (way if number % 2 == 0 else 1.0 - way))
+            truth.append(np.full(len(way), -1 if number % 2 == 0 else 1))
+        x = np.concatenate(strokes)
+        x = np.round(x + 0.0027 * rng.normal(size=len(x)), 4)
+        np.testing.assert_array_equal(detect_branch(x, turn_threshold(x), noise_sd(x)), np.concatenate(truth))
+
+
 def test_rows_before_the_first_motion_have_no_branch() -> None:
     x = np.concatenate([np.zeros(300), np.linspace(0.0, 10.0, 500)])
     found = detect_branch(x, turn_threshold(x), noise_sd(x))
