@@ -18,6 +18,10 @@ CLOSE_FREEDOM = 20.0
 EM_ROUNDS = 25
 PULL = 0.02
 """Share of all draws that counts towards each component."""
+LOCAL, LOCAL_FREEDOM = 150, 5.0
+"""Components of a mixture that follows a bent posterior, and the degrees of freedom of each."""
+NEAREST = 0.1
+"""Share of the draws whose covariance is that of a local component."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,29 @@ def fit_normals(x: Array, weight: Array, count: int) -> tuple[list[Array], list[
         covariances = (spread + PULL * whole) / (shares + PULL)[:, None, None]
         shares = (shares + PULL) / (1.0 + count * PULL)
     return list(means), list(covariances), shares
+
+
+def fit_local(x: Array, weight: Array, rng: np.random.RandomState) -> StudentMixture:
+    """A mixture that follows weighted draws (n, d) where they bend: kernels, each as wide as its surroundings.
+
+    The kernels stand on draws that are chosen by weight; the nearest of all draws give their covariances.
+    """
+    n, d = x.shape
+    centre = weight @ x
+    whole = (x - centre).T @ ((x - centre) * weight[:, None]) + 1e-10 * np.eye(d)
+    white = np.linalg.solve(np.linalg.cholesky(whole), (x - centre).T).T
+    chosen = np.searchsorted(np.cumsum(weight), (np.arange(LOCAL) + rng.uniform()) / LOCAL)
+    chosen = np.minimum(chosen, n - 1)
+    away = np.sum(white**2, axis=1) - 2.0 * white[chosen] @ white.T
+    count = min(max(int(NEAREST * n), 10 * d), n)
+    nearest = np.argpartition(away, count - 1, axis=1)[:, :count]
+    own = weight[nearest]
+    # Where a few of the draws have all the weight, the others tell the width as well.
+    own = own / own.sum(axis=1, keepdims=True) + 1.0 / count
+    own = own / own.sum(axis=1, keepdims=True)
+    delta = x[nearest] - np.einsum("kn,knd->kd", own, x[nearest])[:, None]
+    spread = np.swapaxes(delta, 1, 2) @ (delta * own[..., None]) + 1e-6 * whole
+    return StudentMixture.build(list(x[chosen]), list(spread), freedom=(LOCAL_FREEDOM,))
 
 
 def independence_move(mixture: StudentMixture) -> MHMove:

@@ -4,7 +4,9 @@ Laplace's covariance at the modes starts it; weighted draws from it refit it (ad
 sampling), with a few components for a posterior that is askew. Where enough of them carry weight, one round
 of the ensembles lets their over-dispersed starts settle. Where not, the posterior is bent, and what a mixture
 misses of a bent tail its own draws cannot show: there the walkers explore by moves that need no mixture,
-climbing again from any that found a better place, and the mixture stays the smaller part of the moves.
+climbing again from any that found a better place. Many small components then follow what they met, and are
+refitted by weighted draws that look beyond it. Where these carry weight, they are the greater part of the moves;
+else a mixture of a few stays the smaller one.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.ensembles import Block, EnsembleState, Moves
 from mpam_calib.posterior.mode import Mode, climb, curvature
-from mpam_calib.posterior.proposal import CLOSE_FREEDOM, FREEDOM, StudentMixture, fit_normals
+from mpam_calib.posterior.proposal import CLOSE_FREEDOM, FREEDOM, StudentMixture, fit_local, fit_normals
 
 Array = NDArray[np.float64]
 
@@ -36,6 +38,10 @@ MODES_SHARE = 0.1
 """Share of the proposal that stays with the modes, whatever was drawn."""
 STEPS, ROUNDS, EXPLORED = 25, 4, 60
 """Steps in which starts settle; rounds of exploring, and the steps of each."""
+LOCAL_ROUNDS, LOCAL_DRAWS = 6, 3000
+"""Refits of a mixture that follows the walkers, and weighted draws of each."""
+FOLLOWS, LOCAL_SHARE = 0.1, 0.6
+"""Effective share from which on it is taken, and its share of the steps."""
 ENOUGH = 0.3
 """Accepted share at which walkers that settled are fit to be fitted."""
 BETTER = 3.0
@@ -148,7 +154,44 @@ def warm_up(
         if number > 0:
             modes = _climb_again(target, blocks, modes)
             mixture = _with_walkers(modes, blocks, MORE_COMPONENTS)
-    return WarmUp(states, Moves(mixture, SHARED), modes, accepted, False)
+    local, share = _weigh_local(blocks, evaluate, seed)
+    accepted.append(share)
+    if share < FOLLOWS:
+        return WarmUp(states, Moves(mixture, SHARED), modes, accepted, False)
+    blocks = run(states, Moves(local, LOCAL_SHARE), STEPS)
+    states = [block.state for block in blocks]
+    accepted.append(_accepted(blocks))
+    return WarmUp(states, Moves(local, LOCAL_SHARE), modes, accepted, False)
+
+
+def _weigh_local(blocks: list[Block], evaluate: Evaluate, seed: int) -> tuple[StudentMixture, float]:
+    """A mixture that follows the walkers, refitted by weighted draws of its own, and its effective share.
+
+    All rounds' draws are weighed against the mean of all rounds' mixtures (Cornuet and others 2012,
+    doi:10.1111/j.1467-9469.2011.00756.x), so that what one of them missed counts from then on.
+    """
+    x = np.concatenate([b.chain[len(b.chain) // 2 :].reshape(-1, b.chain.shape[2]) for b in blocks])
+    weight = np.full(len(x), 1.0 / len(x))
+    rng = np.random.RandomState(seed)
+    mixtures: list[StudentMixture] = []
+    drawn, log_p = np.empty((0, x.shape[1])), np.empty(0)
+    share = 0.0
+    for _ in range(LOCAL_ROUNDS):
+        mixtures.append(fit_local(x, weight, rng))
+        new = mixtures[-1].draw(LOCAL_DRAWS, rng)
+        own = evaluate(new)
+        share = _effective(own - mixtures[-1].log_density(new))
+        drawn, log_p = np.concatenate([drawn, new]), np.concatenate([log_p, own])
+        log_q = np.logaddexp.reduce([m.log_density(drawn) for m in mixtures])
+        weight = np.exp(log_p - log_q - (log_p - log_q).max())
+        x, weight = drawn, weight / weight.sum()
+    return mixtures[-1], share
+
+
+def _effective(log_weight: Array) -> float:
+    """Effective share of weighted draws."""
+    weight = np.exp(log_weight - log_weight.max())
+    return float(weight.sum() ** 2 / np.sum(weight**2) / len(weight))
 
 
 def _accepted(blocks: list[Block]) -> float:

@@ -68,7 +68,8 @@ def search_beside_a_remainder(problem: Problem, margin: float, misfit: float) ->
 
 
 @pytest.mark.parametrize(
-    ("margin", "misfit", "stands"), [(15.0, 1.0, False), (30.0, 1.0, True), (30.0, 3.0, False), (90.0, 3.0, True)]
+    ("margin", "misfit", "stands"),
+    [(15.0, 1.0, False), (30.0, 1.0, True), (30.0, 3.0, False), (90.0, 3.0, True)],
 )
 def test_a_cause_stands_beside_unexplained_structure_only_by_far(
     problem: Problem, margin: float, misfit: float, stands: bool

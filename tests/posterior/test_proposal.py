@@ -8,7 +8,9 @@ from emcee import EnsembleSampler, State
 from emcee.moves import MHMove
 from scipy import integrate, stats
 
-from mpam_calib.posterior.proposal import FREEDOM, StudentMixture, fit_normals, independence_move
+from mpam_calib.posterior.ensembles import Block, EnsembleState
+from mpam_calib.posterior.proposal import FREEDOM, StudentMixture, fit_local, fit_normals, independence_move
+from mpam_calib.posterior.warmup import _weigh_local
 
 MEANS = [np.array([0.0, 1.0]), np.array([3.0, -1.0])]
 SPREADS = [np.array([[1.0, 0.6], [0.6, 2.0]]), np.array([[0.3, -0.1], [-0.1, 0.5]])]
@@ -74,6 +76,43 @@ def test_draws_follow_the_density():
         return 0.5 * (parts[0] + parts[1])
 
     assert stats.kstest(x[:, 0], marginal).pvalue > 1e-3
+
+
+def bent(n: int) -> np.ndarray:
+    """Draws of u₁ ~ N(0, 1), u₂ | u₁ ~ N(u₁², 0.1²)."""
+    rng = np.random.default_rng(7)
+    along = rng.standard_normal(n)
+    return np.column_stack([along, along**2 + 0.1 * rng.standard_normal(n)])
+
+
+def log_bent(u: np.ndarray) -> np.ndarray:
+    return stats.norm.logpdf(u[:, 0]) + stats.norm.logpdf(u[:, 1], u[:, 0] ** 2, 0.1)
+
+
+def effective_share(made: StudentMixture) -> float:
+    x = made.draw(20_000, np.random.RandomState(1))
+    weight = np.exp(log_bent(x) - made.log_density(x))
+    return float(weight.sum() ** 2 / np.sum(weight**2) / len(weight))
+
+
+def test_a_local_mixture_follows_a_bend_that_few_normals_do_not():
+    x = bent(6000)
+    weight = np.full(len(x), 1.0 / len(x))
+    assert effective_share(fit_local(x, weight, np.random.RandomState(0))) > 0.5
+    assert effective_share(StudentMixture.build(*fit_normals(x, weight, 6))) < 0.4
+
+
+def test_weighted_draws_find_the_tail_that_no_walker_met():
+    """Walkers that never went beyond one sd on one side of the bend; 16 % of the density are there."""
+    x = bent(8000)
+    x = x[x[:, 0] < 1.0]
+    here = np.repeat(x[None, :500], 2, axis=0)
+    state = EnsembleState(x[:500], log_bent(x[:500]), None)
+    made, share = _weigh_local([Block(here, np.zeros((2, 500)), 0.5, state)], log_bent, 0)
+    drawn = made.draw(20_000, np.random.RandomState(2))
+    assert np.mean(drawn[:, 0] > 1.0) > 0.13
+    assert share == pytest.approx(effective_share(made), abs=0.05)
+    assert share > 0.4
 
 
 def test_widened_draws_are_wider():
