@@ -104,7 +104,7 @@ def fit_normals(x: Array, weight: Array, count: int) -> tuple[list[Array], list[
 
 
 def fit_local(x: Array, weight: Array, rng: np.random.RandomState) -> StudentMixture:
-    """A mixture that follows weighted draws (n, d) where they bend: kernels, each as wide as its surroundings.
+    """A mixture that follows weighted draws (n, d) where they bend: kernels as wide as their surroundings.
 
     The kernels stand on draws that are chosen by weight; the nearest of all draws give their covariances.
     """

@@ -5,8 +5,8 @@ sampling), with a few components for a posterior that is askew. Where enough of 
 of the ensembles lets their over-dispersed starts settle. Where not, the posterior is bent, and what a mixture
 misses of a bent tail its own draws cannot show: there the walkers explore by moves that need no mixture,
 climbing again from any that found a better place. Many small components then follow what they met, and are
-refitted by weighted draws that look beyond it. Where these carry weight, they are the greater part of the moves;
-else a mixture of a few stays the smaller one.
+refitted by weighted draws that look beyond it. Where these carry weight, they are the greater part of the
+moves; else a mixture of a few stays the smaller one.
 """
 
 from __future__ import annotations
