@@ -103,10 +103,11 @@ def fit_normals(x: Array, weight: Array, count: int) -> tuple[list[Array], list[
     return list(means), list(covariances), shares
 
 
-def fit_local(x: Array, weight: Array, rng: np.random.RandomState) -> StudentMixture:
+def fit_local(x: Array, weight: Array, rng: np.random.RandomState, widen: float = 1.0) -> StudentMixture:
     """A mixture that follows weighted draws (n, d) where they bend: kernels as wide as their surroundings.
 
-    The kernels stand on draws that are chosen by weight; the nearest of all draws give their covariances.
+    The kernels stand on draws that are chosen by weight; the nearest of all draws give their covariances, and
+    ``widen`` multiplies their scale.
     """
     n, d = x.shape
     centre = weight @ x
@@ -123,7 +124,7 @@ def fit_local(x: Array, weight: Array, rng: np.random.RandomState) -> StudentMix
     own = own / own.sum(axis=1, keepdims=True)
     delta = x[nearest] - np.einsum("kn,knd->kd", own, x[nearest])[:, None]
     spread = np.swapaxes(delta, 1, 2) @ (delta * own[..., None]) + 1e-6 * whole
-    return StudentMixture.build(list(x[chosen]), list(spread), freedom=(LOCAL_FREEDOM,))
+    return StudentMixture.build(list(x[chosen]), list(widen**2 * spread), freedom=(LOCAL_FREEDOM,))
 
 
 def independence_move(mixture: StudentMixture) -> MHMove:

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.ensembles import Block, EnsembleState, Moves
+from mpam_calib.posterior.local import follow
 from mpam_calib.posterior.mode import Mode, climb, curvature
-from mpam_calib.posterior.proposal import CLOSE_FREEDOM, FREEDOM, StudentMixture, fit_local, fit_normals
+from mpam_calib.posterior.proposal import CLOSE_FREEDOM, FREEDOM, StudentMixture, fit_normals
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ STEPS, ROUNDS, EXPLORED = 25, 4, 60
 """Steps in which starts settle; rounds of exploring, and the steps of each."""
 LOCAL_ROUNDS, LOCAL_DRAWS = 6, 3000
 """Refits of a mixture that follows the walkers, and weighted draws of each."""
-FOLLOWS, LOCAL_SHARE = 0.1, 0.6
+FOLLOWS, LOCAL_SHARE = 0.03, 0.6
 """Effective share from which on it is taken, and its share of the steps."""
 ENOUGH = 0.3
 """Accepted share at which walkers that settled are fit to be fitted."""
@@ -90,8 +91,13 @@ def _with_fit(modes: list[Mode], x: Array, weight: Array, components: int = COMP
 
 def _with_walkers(modes: list[Mode], blocks: list[Block], components: int = COMPONENTS) -> StudentMixture:
     """What the walkers drew in the second half of their blocks, and a little of the modes' curvature."""
-    drawn = np.concatenate([b.chain[len(b.chain) // 2 :].reshape(-1, b.chain.shape[2]) for b in blocks])
+    drawn = _drawn(blocks)
     return _with_fit(modes, drawn, np.full(len(drawn), 1.0 / len(drawn)), components)
+
+
+def _drawn(blocks: list[Block]) -> Array:
+    """What the walkers drew in the second half of their blocks (n, d)."""
+    return np.concatenate([b.chain[len(b.chain) // 2 :].reshape(-1, b.chain.shape[2]) for b in blocks])
 
 
 def _weigh(modes: list[Mode], evaluate: Evaluate, seed: int) -> tuple[StudentMixture, list[float]]:
@@ -154,44 +160,16 @@ def warm_up(
         if number > 0:
             modes = _climb_again(target, blocks, modes)
             mixture = _with_walkers(modes, blocks, MORE_COMPONENTS)
-    local, share = _weigh_local(blocks, evaluate, seed)
-    accepted.append(share)
-    if share < FOLLOWS:
+    x = _drawn(blocks)
+    alike = np.full(len(x), 1.0 / len(x))
+    local = follow(evaluate, x, alike, LOCAL_ROUNDS, LOCAL_DRAWS, np.random.RandomState(seed))
+    accepted.append(local.share)
+    if local.share < FOLLOWS:
         return WarmUp(states, Moves(mixture, SHARED), modes, accepted, False)
-    blocks = run(states, Moves(local, LOCAL_SHARE), STEPS)
-    states = [block.state for block in blocks]
+    moves = Moves(local.mixture, LOCAL_SHARE)
+    blocks = run(states, moves, STEPS)
     accepted.append(_accepted(blocks))
-    return WarmUp(states, Moves(local, LOCAL_SHARE), modes, accepted, False)
-
-
-def _weigh_local(blocks: list[Block], evaluate: Evaluate, seed: int) -> tuple[StudentMixture, float]:
-    """A mixture that follows the walkers, refitted by weighted draws of its own, and its effective share.
-
-    All rounds' draws are weighed against the mean of all rounds' mixtures (Cornuet and others 2012,
-    doi:10.1111/j.1467-9469.2011.00756.x), so that what one of them missed counts from then on.
-    """
-    x = np.concatenate([b.chain[len(b.chain) // 2 :].reshape(-1, b.chain.shape[2]) for b in blocks])
-    weight = np.full(len(x), 1.0 / len(x))
-    rng = np.random.RandomState(seed)
-    mixtures: list[StudentMixture] = []
-    drawn, log_p = np.empty((0, x.shape[1])), np.empty(0)
-    share = 0.0
-    for _ in range(LOCAL_ROUNDS):
-        mixtures.append(fit_local(x, weight, rng))
-        new = mixtures[-1].draw(LOCAL_DRAWS, rng)
-        own = evaluate(new)
-        share = _effective(own - mixtures[-1].log_density(new))
-        drawn, log_p = np.concatenate([drawn, new]), np.concatenate([log_p, own])
-        log_q = np.logaddexp.reduce([m.log_density(drawn) for m in mixtures])
-        weight = np.exp(log_p - log_q - (log_p - log_q).max())
-        x, weight = drawn, weight / weight.sum()
-    return mixtures[-1], share
-
-
-def _effective(log_weight: Array) -> float:
-    """Effective share of weighted draws."""
-    weight = np.exp(log_weight - log_weight.max())
-    return float(weight.sum() ** 2 / np.sum(weight**2) / len(weight))
+    return WarmUp([block.state for block in blocks], moves, modes, accepted, False)
 
 
 def _accepted(blocks: list[Block]) -> float:

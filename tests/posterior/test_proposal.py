@@ -8,9 +8,8 @@ from emcee import EnsembleSampler, State
 from emcee.moves import MHMove
 from scipy import integrate, stats
 
-from mpam_calib.posterior.ensembles import Block, EnsembleState
+from mpam_calib.posterior.local import follow
 from mpam_calib.posterior.proposal import FREEDOM, StudentMixture, fit_local, fit_normals, independence_move
-from mpam_calib.posterior.warmup import _weigh_local
 
 MEANS = [np.array([0.0, 1.0]), np.array([3.0, -1.0])]
 SPREADS = [np.array([[1.0, 0.6], [0.6, 2.0]]), np.array([[0.3, -0.1], [-0.1, 0.5]])]
@@ -106,13 +105,15 @@ def test_weighted_draws_find_the_tail_that_no_walker_met():
     """Walkers that never went beyond one sd on one side of the bend; 16 % of the density are there."""
     x = bent(8000)
     x = x[x[:, 0] < 1.0]
-    here = np.repeat(x[None, :500], 2, axis=0)
-    state = EnsembleState(x[:500], log_bent(x[:500]), None)
-    made, share = _weigh_local([Block(here, np.zeros((2, 500)), 0.5, state)], log_bent, 0)
-    drawn = made.draw(20_000, np.random.RandomState(2))
-    assert np.mean(drawn[:, 0] > 1.0) > 0.13
-    assert share == pytest.approx(effective_share(made), abs=0.05)
-    assert share > 0.4
+    found = follow(log_bent, x, np.full(len(x), 1.0 / len(x)), 6, 3000, np.random.RandomState(0))
+    drawn = found.mixture.draw(20_000, np.random.RandomState(2))
+    assert np.mean(drawn[:, 0] > 1.0) > 0.1
+    assert found.share == pytest.approx(effective_share(found.mixture), abs=0.05)
+    assert found.share > 0.4
+    # The density is normalised, and its moments are known.
+    assert abs(found.log_integral) < 4.0 * found.error < 0.1
+    mean = found.weight @ found.drawn
+    np.testing.assert_allclose(mean, [0.0, 1.0], atol=0.1)
 
 
 def test_widened_draws_are_wider():
