@@ -6,8 +6,9 @@ In more, the density is followed along each axis of the mode's ellipsoid, and th
 is the importance density of a randomised quasi-Monte Carlo rule. Where its weights are uneven, the axes are
 bent first: along the widest coordinate the others are led along the density's own ridge (nested Laplace).
 
-Only the one mode is integrated, and what is narrow and far off the axes can be missed; ``error`` says how
-far independent randomisations of the rule differ. In ten dimensions along curved ridges the rule does not
+Only the one mode is integrated, and what is narrow and far off the axes can be missed (0.03 to 0.28 nats on
+ridges of two rates that three levels hardly tell apart); ``error`` says how far independent randomisations of
+the rule differ, no more. In ten dimensions along curved ridges the rule does not
 settle: the error then says so (``Evidence.reliable``), and Laplace's figure is the better one.
 """
 

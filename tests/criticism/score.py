@@ -2,8 +2,8 @@
 
 ``locked-halved`` has the same cases with every effect at half its size; ``develop-bent`` has develop's with
 their effects' forms bent at random.
-Every case is one line of ``reports/score_<set>.csv``; a second run goes on where the first stopped. The
-rates that it prints are those of the issue, each with its binomial (Wilson) interval.
+Every case is one line of ``reports/score_<set>.csv``; a second run goes on where the first stopped. Every
+rate that it prints has its binomial (Wilson) interval.
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ def plain(which: str) -> str:
 
 
 def rates(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
-    """The issue's rates as (what, hits, of)."""
+    """The rates that are asked of diagnose, as (what, hits, of)."""
     table = margins.read_margins(plain(which))
     column = "margin_halved" if which.endswith(HALVED) else "margin"
     separable = {name for name, row in table.items() if row[column] and float(row[column]) >= NATS}
