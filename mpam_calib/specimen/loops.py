@@ -126,7 +126,7 @@ def _check_plausible(file: DataFile, frame: pd.DataFrame, geometry: Geometry) ->
     held = "branch" in frame and bool(frame["branch"].isin([PRESSURISING, DEPRESSURISING]).any())
     rows = frame.index.to_numpy()
     check_displacement(file.label, frame["displacement_mm"].to_numpy() * MM, rows, geometry, held=held)
-    check_force(file.label, "loops", frame["force_N"].to_numpy())
+    check_force(file.label, "loops", frame["force_N"].to_numpy(), frame["displacement_mm"].to_numpy())
 
 
 def _levels_and_branches(frames: Sequence[pd.DataFrame], clock: Ints, setpoints: bool) -> tuple[Ints, Ints]:

@@ -15,6 +15,8 @@ from mpam_calib.units import KPA, MM
 HIGHEST_LEVEL_KPA = 5000.0
 LEAST_STROKE = 0.005
 """Smaller largest displacements, as a share of L0, are taken for metres."""
+LONG_SHARE = 0.1
+"""Share of the rows that are taken as those where the muscle is long."""
 
 
 def map_hint(kind: FileKind, column: str, scale: str) -> str:
@@ -31,10 +33,15 @@ def check_pressure(label: str, kind: FileKind, pressure_Pa: Floats, rows: Ints) 
         raise InputError(label, found, expected, int(rows[high[0]]), "pressure_kPa")
 
 
-def check_force(label: str, kind: FileKind, force_N: Floats) -> None:
-    """Refuse forces of which most are negative."""
+def check_force(label: str, kind: FileKind, force_N: Floats, shortening: Floats | None = None) -> None:
+    """Refuse forces of which most are negative.
+
+    Except with a ``shortening`` (any unit): a muscle that pulls where it is long may well be driven so far
+    that it pushes in most rows.
+    """
     median = float(np.median(force_N))
-    if median < 0.0:
+    long = force_N if shortening is None else force_N[shortening <= np.quantile(shortening, LONG_SHARE)]
+    if median < 0.0 and np.median(long) < 0.0:
         found = f"a median force of {median:.3g} N (flipped sign?)"
         expected = f"pulling forces above 0; {map_hint(kind, 'force_N', '-1.0')}"
         raise InputError(label, found, expected, None, "force_N")

@@ -179,3 +179,17 @@ def test_digest_follows_meaning_and_bytes(tmp_path: Path) -> None:
     with (folder / "loops.csv").open("a") as stream:
         stream.write("\n")
     assert read(folder).digest not in (first, second)
+
+
+def test_a_muscle_that_pushes_in_most_rows_is_read(tmp_path: Path) -> None:
+    """Driven far beyond its free contraction; it still pulls where it is long."""
+    recording = loops()
+    beyond = (
+        recording.force.max()
+        - 2.0 * recording.force.max() * (recording.displacement / recording.displacement.max()) ** 0.5
+    )
+    assert np.median(beyond) < 0.0
+    pushing = Recording(
+        recording.time, recording.pressure, recording.displacement, beyond, recording.branch, recording.cycle
+    )
+    assert loops_of(read(make(tmp_path, loops=pushing.text()))).force_N.min() < 0.0
