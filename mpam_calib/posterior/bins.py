@@ -32,6 +32,8 @@ REST_BINS = 0.2
 """Bins of a stroke's rest, at most, for each one of its motion."""
 SLACK_SHARE = 0.2
 """A bin with this share of its readings at or below the floor says "slack", not a value."""
+SLACK_SDS, SLACK_ABOVE = 5.0, 4.5
+"""Sds of noise that slack readings stay below: above a typical flagged one, and above the floor."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,13 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2) -> LoopBins:
     speed, rest = speeds(
         loops, stroke_starts, stroke_starts + lengths - 1, np.repeat(np.arange(len(lengths)), lengths)
     )
-    per_stroke = [_edges(part, most, finest) for part in np.split(rest, stroke_starts[1:])]
+    beyond = _beyond_floor(loops, stroke_starts)
+    per_stroke = [
+        np.union1d(_edges(part, most, finest), np.flatnonzero(np.diff(slack, prepend=slack[0])))
+        for part, slack in zip(
+            np.split(rest, stroke_starts[1:]), np.split(beyond, stroke_starts[1:]), strict=True
+        )
+    ]
     starts = np.concatenate([s + e for s, e in zip(stroke_starts, per_stroke, strict=True)])
     segment = np.repeat(np.arange(len(lengths)), [len(e) for e in per_stroke])
     position = np.concatenate([np.arange(len(e)) for e in per_stroke])
@@ -170,7 +178,7 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2) -> LoopBins:
         stop=loops.time_s[stops - 1],
         dt=np.maximum(dt, 1e-9),
         slack=_beyond_slack(
-            mean(loops.censored.astype(np.float64)) >= SLACK_SHARE,
+            (mean(loops.censored.astype(np.float64)) >= SLACK_SHARE) | beyond[starts],
             displacement,
             segment,
             2 * loops.level[starts] + (direction > 0),
@@ -182,6 +190,22 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2) -> LoopBins:
         averaged=loops.averaged,
         nodes=Nodes.build(loops.force_N, row_readings(loops), _wider(starts, segment, position, most)),
     )
+
+
+def _beyond_floor(loops: Loops, stroke_starts: Ints) -> NDArray[np.bool_]:
+    """Rows at the slack end of their stroke: none further contracted reads clearly more than the floor.
+
+    A bin that holds pulling and slack readings is neither; and of few slack readings all may lie above it, so
+    that a stroke ends without a flag.
+    """
+    if not loops.censored.any():
+        return np.zeros(len(loops.force_N), dtype=bool)
+    segment = np.repeat(np.arange(len(stroke_starts)), np.diff(np.append(stroke_starts, len(loops.force_N))))
+    second = np.diff(loops.force_N, 2)[segment[2:] == segment[:-2]]
+    noise = float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0)) if len(second) else 0.0
+    pulls = loops.force_N > np.median(loops.force_N[loops.censored]) + SLACK_SDS * noise
+    last = np.maximum.reduceat(np.where(pulls, loops.displacement_m, -np.inf), stroke_starts)
+    return np.asarray(loops.displacement_m > last[segment])
 
 
 def _beyond_slack(

@@ -22,7 +22,7 @@ from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, gro
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
 from mpam_calib.posterior.algebra import condense, log_determinant, solve_transposed
-from mpam_calib.posterior.bins import LoopBins
+from mpam_calib.posterior.bins import SLACK_ABOVE, LoopBins
 from mpam_calib.posterior.covariance import StrokeCovariance, fast_noise_covariance, fast_noise_log_likelihood
 from mpam_calib.posterior.piece import LOG_2PI, Piece, forget, segment_piece, total, white_piece
 from mpam_calib.posterior.points import Points, TensilePoints
@@ -196,8 +196,8 @@ class Collapsed:
         if bins.slack.any():
             sd = np.sqrt(white[:, None] ** 2 + correlated[:, None] ** 2 + rough[:, None] ** 2)
             rows = bins.slack
-            # A fifth of the readings at the floor: the force is at most 0.84 sd of a reading above it.
-            floor = self.data.floor + 0.84 * np.broadcast_to(white[:, None], (B, int(rows.sum())))
+            # Slack readings stay within some sds of one above the floor; the force may be as high.
+            floor = self.data.floor + SLACK_ABOVE * np.broadcast_to(white[:, None], (B, int(rows.sum())))
             slack.append(
                 Slack(
                     np.broadcast_to(fixed, (B, n))[:, rows],

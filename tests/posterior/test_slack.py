@@ -11,6 +11,7 @@ from scipy import integrate, stats
 
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.bins import bin_loops
 from mpam_calib.posterior.target import build_target
 from mpam_calib.specimen.declaration import Sensors
 from mpam_calib.specimen.recording import ForceMap
@@ -119,3 +120,23 @@ def test_one_wrong_flag_does_not_outweigh_the_readings():
     without, mean_without, _ = by_quadrature(f, A, y, flagged)
     assert target.log_likelihood(values)[0] - without == pytest.approx(np.log(WRONG), abs=0.02)
     assert mean == pytest.approx(mean_without, abs=0.01 * sd)
+
+
+@pytest.mark.parametrize("rows", [30, 40, 200])
+def test_no_bin_holds_what_a_floor_made_of_the_force(rows):
+    """Forces of 60 N to -20 N over strokes of few readings, a floor at 0 N, noise of 0.5 N on top.
+
+    A bin is slack, or its mean is that of the force without a floor. Wholly slack bins say so.
+    """
+    rng = np.random.default_rng(rows)
+    for _ in range(10):
+        made = build.loops((100.0, 150.0, 200.0), 10.0, rows, cycles=2)
+        force = 60.0 - 8000.0 * made.displacement_m + 2e-5 * (made.pressure_Pa - 1e5)
+        reading = np.maximum(force, 0.0) + NOISE * rng.standard_normal(len(force))
+        bins = bin_loops(replace(made, force_N=reading, censored=reading <= 0.0))
+        first = np.concatenate([[0], np.cumsum(bins.count)[:-1]]).astype(int)
+        exact = np.add.reduceat(force, first) / bins.count
+        off = (bins.force - exact) * np.sqrt(bins.count) / NOISE
+        assert np.abs(off[~bins.slack]).max() < 6.0
+        assert bins.slack[exact < -2.0 * NOISE].all()
+        assert not bins.slack[exact > 8.0 * NOISE].any()
