@@ -205,7 +205,7 @@ def _beyond_floor(loops: Loops, stroke_starts: Ints) -> NDArray[np.bool_]:
     noise = float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0)) if len(second) else 0.0
     pulls = loops.force_N > np.median(loops.force_N[loops.censored]) + SLACK_SDS * noise
     last = np.maximum.reduceat(np.where(pulls, loops.displacement_m, -np.inf), stroke_starts)
-    return np.asarray(loops.displacement_m > last[segment])
+    return np.asarray((loops.displacement_m > last[segment]) & (np.abs(loops.branch) == 1))
 
 
 def _beyond_slack(

@@ -17,6 +17,8 @@ from mpam_calib.posterior.proposal import StudentMixture, fit_local
 
 Array = NDArray[np.float64]
 
+PIECE = 500
+"""Points that all components are evaluated at together: more would take hundreds of megabytes."""
 BEYOND = 1.5
 """Width of the components while they look beyond what was met, in that of the last round's."""
 
@@ -65,10 +67,14 @@ def follow(
         new = mixtures[-1].draw(draws, rng)
         own = log_density(new)
         drawn, log_p = np.concatenate([drawn, new]), np.concatenate([log_p, own])
-        log_q = np.logaddexp.reduce([m.log_density(drawn) for m in mixtures]) - np.log(len(mixtures))
+        log_q = np.logaddexp.reduce([_log_density(m, drawn) for m in mixtures]) - np.log(len(mixtures))
         x, weight = drawn, special.softmax(log_p - log_q)
-    share = effective_share(own - mixtures[-1].log_density(new))
+    share = effective_share(own - _log_density(mixtures[-1], new))
     return Followed(mixtures[-1], drawn, log_p - log_q, share)
+
+
+def _log_density(mixture: StudentMixture, x: Array) -> Array:
+    return np.concatenate([mixture.log_density(x[i : i + PIECE]) for i in range(0, len(x), PIECE)])
 
 
 def effective_share(log_weight: Array) -> float:
