@@ -28,6 +28,8 @@ NEWTON_REACH = 0.5
 """Standard deviations over which differences are taken."""
 NEWTON_STEPS, NEWTON_GAIN, SHORTER = 6, 0.005, (1.0, 0.5, 0.2, 0.05)
 """Newton steps at most, the gain (nats) below which they end, and shares of a step that are tried."""
+HARSHEST = 1e14
+"""Information on the moduli, in their priors', beyond which the priors are lost to rounding."""
 SAME = 1e-11
 """Share to which slopes must be sums of known shapes."""
 
@@ -76,13 +78,15 @@ class Hypothesis:
             gram, pull = self._products_of_slopes(slope, columns[0], residual)
         else:
             gram, pull = self._products(slope, columns, residual)
-        gram = gram + np.eye(gram.shape[1])
+        size = np.trace(gram, axis1=1, axis2=2)
+        sound = size < HARSHEST
+        gram = np.where(sound[:, None, None], gram, 0.0) + np.eye(gram.shape[1])
         mean = np.linalg.solve(gram, pull[..., None])[..., 0]
         quadratic = np.sum(residual**2, axis=1) - np.sum(pull * mean, axis=1)
         log_det = self.problem.log_dets[self.fit.size] + np.linalg.slogdet(gram)[1]
         prior = np.sum(u**2, axis=1) + u.shape[1] * LOG_2PI
         result: Array = -0.5 * (quadratic + log_det + n * LOG_2PI + prior)
-        return np.where(np.isfinite(result), result, -np.inf)
+        return np.where(sound & np.isfinite(result), result, -np.inf)
 
     def _whitened(self, columns: Array) -> Array:
         """C^(−1/2) times columns (n, k)."""

@@ -24,7 +24,7 @@ from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.moduli import rate_names
 from mpam_calib.specimen.declaration import Simulation
 
-NEAR = 20.0
+NEAR = 10.0
 """Nats below the best within which Laplace's evidence is replaced by quadrature."""
 SILENT = 300.0
 """Nats below a larger remainder at which still smaller ones are not tried."""

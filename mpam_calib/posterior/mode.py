@@ -19,7 +19,7 @@ from mpam_calib.posterior.pool import held_target, workers
 Array = NDArray[np.float64]
 
 GRADIENT_STEP = 2e-5
-BATCH = 16
+BATCH = 64
 """Points of any other density evaluated at once."""
 TRIED, CLIMBED = 256, 4
 """Prior draws that are looked at, and the best of them that climbs start from."""

@@ -83,6 +83,18 @@ class Curved:
         return self.exact + stats.norm.logpdf(a) + stats.norm.logpdf(b, self.bend * a**2, 0.2)
 
 
+@dataclass(frozen=True)
+class Sheet:
+    """Two wide coordinates and four that lie 0.02 thin on a bent sheet over them: ln Z = 1.5."""
+
+    exact: float = 1.5
+
+    def log_posterior(self, u: Array) -> Array:
+        z, y = u[:, :2], u[:, 2:]
+        at = np.stack([0.5 * np.sin(z[:, 0]), z[:, 1] ** 2, z[:, 0] * z[:, 1], np.exp(0.5 * z[:, 1])], axis=1)
+        return self.exact + stats.norm.logpdf(z).sum(axis=1) + stats.norm.logpdf(y, at, 0.02).sum(axis=1)
+
+
 KNOWN = {
     "gaussian": Gaussian(),
     "skewed": Skewed(),
@@ -102,5 +114,5 @@ def mode_of(density: object, dimensions: int) -> Mode:
 def dimensions_of(density: object) -> int:
     return {
         Gaussian: lambda d: d.dimensions, Skewed: lambda d: len(d.shapes),
-        Bounded: lambda d: len(d.y), Curved: lambda d: 2,
+        Bounded: lambda d: len(d.y), Curved: lambda d: 2, Sheet: lambda d: 6,
     }[type(density)](density)  # fmt: skip

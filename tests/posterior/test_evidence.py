@@ -16,7 +16,7 @@ from mpam_calib.posterior.mode import Mode, evaluate
 from mpam_calib.posterior.target import build_target, locate, predict_force
 from mpam_calib.specimen.recording import Specimen
 
-from .densities import KNOWN, Curved, dimensions_of, mode_of
+from .densities import KNOWN, Curved, Sheet, dimensions_of, mode_of
 
 INSIDE, ELSEWHERE = 0.02, 0.1
 """Nats allowed where a mode is four sds inside its bounds, and elsewhere."""
@@ -37,6 +37,21 @@ def test_a_strongly_curved_density():
     for seed in range(5):
         assert integrate(density, mode_of(density, 2), seed).value == pytest.approx(-3.0, abs=ELSEWHERE)
     assert mode_of(density, 2).log_evidence < -3.0 - ELSEWHERE
+
+
+def test_a_sheet_in_six_dimensions():
+    """Two wide coordinates that four others follow: no axes and no single ridge show it."""
+    density = Sheet()
+    mode = mode_of(density, 6)
+    found = [integrate(density, mode, seed) for seed in range(5)]
+    off = np.array([e.value for e in found]) - density.exact
+    assert abs(mode.log_evidence - density.exact) > ELSEWHERE
+    assert np.sqrt(np.mean(off**2)) < INSIDE
+    assert np.all(np.abs(off) < 4.0 * np.array([e.error for e in found]))
+    assert all(e.reliable for e in found)
+    for e in found:
+        assert np.abs(e.mean[:2]).max() < 0.15
+        assert np.diag(e.covariance)[:2] == pytest.approx([1.0, 1.0], abs=0.15)
 
 
 @pytest.mark.parametrize("name", ["at its bound", "beyond its bound", "skewed"])
@@ -60,22 +75,41 @@ def test_without_parameters_it_is_the_density_itself():
     assert integrate(KNOWN["gaussian"], mode).value == -12.5
 
 
-def test_a_tail_that_no_axis_sees_shows_in_the_error():
-    """A second mass of equal size, far off the axes: nothing can find it, the documented limit.
-
-    What half-finds it (a wide, faint mass around) does show.
-    """
-
-    class Halo:
-        def log_posterior(self, u: np.ndarray) -> np.ndarray:
-            narrow = -0.5 * np.sum(u**2, axis=1)
-            wide = -0.5 * np.sum((u / 6.0) ** 2, axis=1) - 3.0
-            return np.logaddexp(narrow, wide)
+class Halo:
+    """A wide, faint mass around a narrow one, 20 times as much of it in five dimensions."""
 
     exact = float(np.log((1.0 + 6.0**5 * np.exp(-3.0)) * (2.0 * np.pi) ** 2.5))
-    found = integrate(Halo(), Mode(np.zeros(5), 0.0, np.eye(5)))
-    assert abs(found.value - exact) > INSIDE
-    assert found.error > INSIDE
+
+    def log_posterior(self, u: np.ndarray) -> np.ndarray:
+        narrow = -0.5 * np.sum(u**2, axis=1)
+        wide = -0.5 * np.sum((u / 6.0) ** 2, axis=1) - 3.0
+        return np.logaddexp(narrow, wide)
+
+
+def test_a_halo_is_found():
+    mode = Mode(np.zeros(5), 0.0, np.eye(5))
+    assert Halo.exact - mode.log_evidence > 5.0
+    for seed in range(3):
+        assert integrate(Halo(), mode, seed).value == pytest.approx(Halo.exact, abs=ELSEWHERE)
+
+
+def test_what_does_not_settle_says_so():
+    """Ten dimensions on a folded sheet, which no choice of the wide coordinates unfolds."""
+
+    class Folded:
+        def log_posterior(self, u: np.ndarray) -> np.ndarray:
+            z, y = u[:, :5], u[:, 5:]
+            return -0.5 * np.sum(z**2, axis=1) - 0.5 * np.sum(((y - 3.0 * z**2) / 0.05) ** 2, axis=1)
+
+    turn = np.linalg.qr(np.random.default_rng(1).standard_normal((10, 10)))[0]
+
+    class Turned:
+        def log_posterior(self, u: np.ndarray) -> np.ndarray:
+            return Folded().log_posterior(u @ turn)
+
+    found = integrate(Turned(), mode_of(Turned(), 10))
+    assert abs(found.value - 5.0 * np.log(2.0 * np.pi * 0.05)) > ELSEWHERE
+    assert not found.reliable
 
 
 def posterior(K_f: float | None, options: Options, seed: int = 0) -> tuple[Collapsed, Mode]:
