@@ -12,6 +12,7 @@ from typing import Protocol, TypeVar
 
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.errors import Interrupted
+from mpam_calib.posterior.pool import settle_worker
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -45,7 +46,7 @@ def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
         return
     try:
         with ProcessPoolExecutor(
-            workers, mp_context=get_context("fork"), initializer=_hold, initargs=(problem,)
+            workers, mp_context=get_context("fork"), initializer=_begin, initargs=(problem,)
         ) as pool:
             yield lambda function, tasks, chunk=1: pool.map(function, tasks, chunksize=chunk)
     except BrokenProcessPool as error:
@@ -68,6 +69,11 @@ def held_problem() -> Problem:
     """The problem that this process works on."""
     assert _PROBLEM is not None
     return _PROBLEM
+
+
+def _begin(problem: Problem) -> None:
+    settle_worker()
+    _hold(problem)
 
 
 def _hold(problem: Problem | None) -> None:

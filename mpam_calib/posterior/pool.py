@@ -36,6 +36,11 @@ def _adopt(target: Collapsed) -> None:
     global _TARGET
     _TARGET = target
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    settle_worker()
+
+
+def settle_worker() -> None:
+    """Let a forked process work by itself, and die with its parent."""
     # One thread each: the work is parallel already, and sums must not depend on the machine.
     threadpool_limits(1)
     if sys.platform == "linux":

@@ -7,6 +7,7 @@ import signal
 
 import pytest
 from rig import sets
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.spread import held_problem, spread_over
@@ -18,6 +19,21 @@ def rows_held(number: int) -> int:
     if number == 0:
         os.kill(os.getpid(), signal.SIGKILL)
     return len(held_problem()) * number
+
+
+def threads(_number: int) -> int:
+    """BLAS threads of this process, at most."""
+    return max((library["num_threads"] for library in threadpool_info()), default=1)
+
+
+def test_workers_have_one_thread_each() -> None:
+    """Whatever the caller's own limit: two threads in each of two workers took three times as long."""
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null")
+    problem = problem_of(specimen_of(recipe.name))
+    with threadpool_limits(2):
+        assert threads(0) == 2
+        with spread_over(problem, 2) as spread:
+            assert list(spread(threads, range(4))) == [1, 1, 1, 1]
 
 
 def test_a_killed_worker_ends_the_work() -> None:
