@@ -149,7 +149,7 @@ def noise_windows(loops: Loops, degree: int = DEGREE) -> Windows | None:
     Where strokes are too short for any degree, those that repeat each other are compared, or each is one
     window.
     """
-    first, length = _strokes(loops)
+    first, length = loops.strokes
     typical = int(np.median(length))
     size, margin = min(WINDOW, typical // 4), max(min(WINDOW, typical // 4) // 4, 2)
     if size < degree + 3 and degree > DEGREE:
@@ -177,18 +177,12 @@ def noise_windows(loops: Loops, degree: int = DEGREE) -> Windows | None:
     return _detrended(loops.force_N[index], loops.force_N[index].mean(axis=1), degree, dt)
 
 
-def _strokes(loops: Loops) -> tuple[Ints, Ints]:
-    """First row and number of rows of each stroke."""
-    first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
-    return first, np.diff(np.append(first, len(loops.stroke)))
-
-
 def _between_cycles(loops: Loops) -> Windows | None:
     """The same from differences of strokes that repeat each other: short strokes leave no other way.
 
     What the muscle does, and whatever is wrong with it, comes back in the next cycle; noise does not.
     """
-    first, length = _strokes(loops)
+    first, length = loops.strokes
     groups: dict[tuple[int, int, int], list[int]] = {}
     for stroke, (f, n) in enumerate(zip(first, length, strict=True)):
         if not loops.censored[f : f + n].any():

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from mpam_calib.criticism.noise_level import NoiseLevel, noise_level
-from mpam_calib.criticism.rows import Rows, saturated, telling_points, telling_strokes, without
+from mpam_calib.criticism.rows import Rows, saturated, telling_points, telling_strokes
 from mpam_calib.criticism.whitening import Whitening
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
@@ -255,8 +255,8 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     loops, beyond = specimen.loops, 0.0
     if loops is not None:
         out = saturated(loops)
-        loops, beyond = without(loops, out), float(out.mean())
-        looked_at = telling_strokes(loops)
+        loops, beyond = loops.without(out), float(out.mean())
+        looked_at = telling_strokes(loops.clear)
         bins = bin_loops(loops, int(np.clip(ROWS // len(looked_at), 8, 32)), finest=1)
         n = len(bins)
         keep = np.flatnonzero(~bins.slack & np.isin(bins.segment, looked_at))

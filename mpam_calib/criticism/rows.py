@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,7 @@ MOST_STROKES, MOST_POINTS = 90, 600
 
 @dataclass(frozen=True)
 class Rows:
-    """Raw readings (n,) in strokes: what the model needs, force (N), stroke; censored ones left out."""
+    """Raw readings (n,) in strokes: what the model needs, force (N), stroke; not censored, not unclear."""
 
     readings: Readings
     force: Array
@@ -40,6 +39,8 @@ class Rows:
     def of(loops: Loops) -> Rows:
         """The first strokes of the loops."""
         keep = ~loops.censored
+        if loops.unclear is not None:
+            keep = keep & ~loops.unclear
         if len(keep) > MOST_ROWS:
             keep = keep & (loops.stroke < loops.stroke[MOST_ROWS])
         index = np.flatnonzero(keep)
@@ -58,25 +59,13 @@ def saturated(loops: Loops) -> NDArray[np.bool_]:
     return found
 
 
-def without(loops: Loops, rows: NDArray[np.bool_]) -> Loops:
-    """The loops without some of their rows."""
-    if not rows.any():
-        return loops
-    arrays: dict[str, Any] = {
-        f.name: value[~rows]
-        for f in fields(loops)
-        if isinstance(value := getattr(loops, f.name), np.ndarray) and len(value) == len(rows)
-    }
-    return replace(loops, **arrays)
-
-
 def telling_strokes(loops: Loops) -> Ints:
     """The strokes that are looked at, as indices in the order of the loops.
 
     All of them, or of each level's cycles the first, the last and some between, closer together in the
     beginning: what happens to a muscle with the cycles happens in the first ones.
     """
-    first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
+    first, _ = loops.strokes
     if len(first) <= MOST_STROKES:
         return np.arange(len(first))
     level, cycle = loops.level[first], loops.cycle[first]

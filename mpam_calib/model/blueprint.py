@@ -178,9 +178,8 @@ def _tensile_range(specimen: Specimen) -> tuple[float, float] | None:
 
 
 def _stroke_time(loops: Loops) -> float:
-    starts = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
-    ends = np.append(starts[1:], len(loops.stroke)) - 1
-    return float(np.median(np.maximum(loops.time_s[ends] - loops.time_s[starts], 1e-3)))
+    first, rows = loops.strokes
+    return float(np.median(np.maximum(loops.time_s[first + rows - 1] - loops.time_s[first], 1e-3)))
 
 
 def _speed(loops: Loops) -> float:

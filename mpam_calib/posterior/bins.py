@@ -113,11 +113,20 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2) -> LoopBins:
     Those at its turn are finer where they keep ``finest`` rows: in bins of one row the encoder's noise may go
     back and forth, and a covariance of such bins is no chain along the way.
     """
-    stroke_starts = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
-    lengths = np.diff(np.append(stroke_starts, len(loops.stroke)))
+    stroke_starts, lengths = loops.strokes
     speed, rest = speeds(
         loops, stroke_starts, stroke_starts + lengths - 1, np.repeat(np.arange(len(lengths)), lengths)
     )
+    travel, from_turn, at_level = history(loops, stroke_starts, lengths)
+    reversal = np.repeat(from_turn, lengths)
+    rows = row_readings(loops)
+    if loops.unclear is not None:
+        # What has no sure branch tells of the motion, and nothing else.
+        clear = ~loops.unclear
+        rest, rows = rest[clear], rows.take(np.flatnonzero(clear))
+        speed, travel, reversal, at_level = (x[clear] for x in (speed, travel, reversal, at_level))
+        loops = loops.clear
+        stroke_starts, lengths = loops.strokes
     beyond = _beyond_floor(loops, stroke_starts)
     per_stroke = [
         np.union1d(_edges(part, most, finest), np.flatnonzero(np.diff(slack, prepend=slack[0])))
@@ -138,7 +147,6 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2) -> LoopBins:
     row_bin = np.repeat(np.arange(len(starts)), stops - starts)
     spread = np.sqrt(mean((loops.displacement_m - displacement[row_bin]) ** 2))
     direction = np.where(loops.branch[starts] == -1, 1.0, -1.0)
-    travel, reversal, at_level = history(loops, stroke_starts, lengths)
     # A bin that comes to rest has the speed of its moving part.
     weight = np.where(rest, 1e-9, 1.0)
 
@@ -154,7 +162,7 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2) -> LoopBins:
         "time": mean(loops.time_s),
         "time_at_level": mean(at_level),
         "cycle": loops.cycle[starts].astype(np.float64),
-        "reversal": reversal[segment],
+        "reversal": reversal[starts],
         "speed": np.exp(moving_mean(np.log(np.maximum(speed, 1e-12)))),
     }
     halves = [
@@ -188,7 +196,7 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2) -> LoopBins:
         scatter=scatter,
         chunks=chunks,
         averaged=loops.averaged,
-        nodes=Nodes.build(loops.force_N, row_readings(loops), _wider(starts, segment, position, most)),
+        nodes=Nodes.build(loops.force_N, rows, _wider(starts, segment, position, most)),
     )
 
 

@@ -19,8 +19,7 @@ DEAD_STOP = 0.2
 
 def row_readings(loops: Loops) -> Readings:
     """Every row of the loops as a reading, unreduced."""
-    first = np.flatnonzero(np.diff(loops.stroke, prepend=loops.stroke[0] - 1))
-    lengths = np.diff(np.append(first, len(loops.stroke)))
+    first, lengths = loops.strokes
     segment = np.repeat(np.arange(len(first)), lengths)
     travel, reversal, at_level = history(loops, first, lengths)
     return Readings(

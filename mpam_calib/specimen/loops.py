@@ -12,9 +12,11 @@ from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import Geometry
 from mpam_calib.specimen.levels import medians_by_label, stroke_levels
 from mpam_calib.specimen.motion import (
-    detect_branch,
+    Motion,
+    cycles_at_turns,
     noise_sd,
     number_cycles,
+    read_motion,
     run_ids,
     run_starts,
     turn_threshold,
@@ -58,13 +60,20 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
         without = [file.label for file, frame in zip(files, frames, strict=True) if name not in frame]
         if without and len(without) < len(files):
             notes.append(f"loops: {name} is not in {listed(without, 3)} and was not used in the others")
-    level, branch = _levels_and_branches(frames, clock, "setpoint_kPa" in everywhere)
+    level, (branch, unclear) = _levels_and_motion(frames, clock, "setpoint_kPa" in everywhere)
+    if unclear.any():
+        notes.append(
+            f"loops: {int(unclear.sum())} readings at turns and ends of holds are left out: their "
+            "displacement does not tell the branch (a column branch would)"
+        )
     rows = pd.concat([frame[sorted(everywhere)] for frame in frames], ignore_index=True)
     pressure = rows["pressure_kPa"].to_numpy() * KPA
     level, levels_Pa = _sorted_levels(pressure, level)
     _check_levels(files, frames, clock, level, levels_Pa)
     if "cycle" in everywhere:
         cycle = rows["cycle"].to_numpy().astype(np.int64)
+        if "branch" not in everywhere:
+            cycle = cycles_at_turns(cycle, run_ids(clock, level), branch)
     else:
         cycle = number_cycles(level, clock, branch)
     loops = Loops(
@@ -79,6 +88,7 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
         clock=clock,
         censored=rows["censored"].to_numpy() > 0.5,
         averaged=averaged,
+        unclear=unclear if unclear.any() else None,
         temperature_C=rows["temperature_C"].to_numpy() if "temperature_C" in everywhere else None,
     )
     return LoopsRead(loops, levels_Pa, tuple(counts), tuple(notes))
@@ -129,13 +139,13 @@ def _check_plausible(file: DataFile, frame: pd.DataFrame, geometry: Geometry) ->
     check_force(file.label, "loops", frame["force_N"].to_numpy(), frame["displacement_mm"].to_numpy())
 
 
-def _levels_and_branches(frames: Sequence[pd.DataFrame], clock: Ints, setpoints: bool) -> tuple[Ints, Ints]:
-    """Level (in any order) and branch of every row.
+def _levels_and_motion(frames: Sequence[pd.DataFrame], clock: Ints, setpoints: bool) -> tuple[Ints, Motion]:
+    """Level (in any order) and motion of every row.
 
     Strokes tell the levels, and a level's own rows tell its strokes: a jump of the crosshead
     between two levels is no stroke. So the motion is looked at twice.
     """
-    rough = np.concatenate([_branches(frame, np.zeros(len(frame), dtype=np.int64)) for frame in frames])
+    rough = _joined([_motion(frame, np.zeros(len(frame), dtype=np.int64)) for frame in frames]).branch
     if setpoints:
         values = np.concatenate([frame["setpoint_kPa"].to_numpy() for frame in frames])
         level = np.unique(np.round(values, 6), return_inverse=True)[1].astype(np.int64)
@@ -143,19 +153,26 @@ def _levels_and_branches(frames: Sequence[pd.DataFrame], clock: Ints, setpoints:
         pressure = np.concatenate([frame["pressure_kPa"].to_numpy() for frame in frames]) * KPA
         steady = ~np.isin(rough, [PRESSURISING, DEPRESSURISING])
         level = stroke_levels(pressure, run_ids(clock, rough), steady)
-    ends = np.cumsum([len(frame) for frame in frames])[:-1]
-    parts = zip(frames, np.split(level, ends), strict=True)
-    return level, np.concatenate([_branches(frame, run_ids(part)) for frame, part in parts])
+    parts = zip(frames, np.split(level, _ends(frames)), strict=True)
+    return level, _joined([_motion(frame, run_ids(part)) for frame, part in parts])
 
 
-def _branches(frame: pd.DataFrame, runs: Ints) -> Ints:
+def _ends(frames: Sequence[pd.DataFrame]) -> Ints:
+    return np.cumsum([len(frame) for frame in frames])[:-1].astype(np.int64)
+
+
+def _joined(parts: Sequence[Motion]) -> Motion:
+    return Motion(np.concatenate([p.branch for p in parts]), np.concatenate([p.unclear for p in parts]))
+
+
+def _motion(frame: pd.DataFrame, runs: Ints) -> Motion:
     """Branch codes as the file gives them, else from the motion within each run."""
     if "branch" in frame:
-        return frame["branch"].to_numpy().astype(np.int64)
+        return Motion(frame["branch"].to_numpy().astype(np.int64), np.zeros(len(frame), dtype=bool))
     displacement = frame["displacement_mm"].to_numpy()
     threshold, sd = turn_threshold(displacement), noise_sd(displacement)
     pieces = np.split(displacement, run_starts(runs)[1:])
-    return np.concatenate([detect_branch(piece, threshold, sd) for piece in pieces])
+    return _joined([read_motion(piece, threshold, sd) for piece in pieces])
 
 
 def _sorted_levels(pressure: Floats, level: Ints) -> tuple[Ints, Floats]:

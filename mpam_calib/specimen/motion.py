@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from math import comb
+from typing import NamedTuple
 
 import numpy as np
 
-from mpam_calib.specimen.recording import LOADING, NO_BRANCH, UNLOADING, Floats, Ints
+from mpam_calib.specimen.recording import LOADING, NO_BRANCH, UNLOADING, Bools, Floats, Ints
 
 RANGE_SHARE = 0.01
 """A turn counts only after moving back by this share of the range ..."""
@@ -25,19 +27,31 @@ SHORTEST, SURE = 1.0, 20.0
 """Rows that a hold lasts at least, and twice the log likelihood by which it must fit better than none."""
 TINY = 1e-12
 """Share of a window's range that passes for an exact fit."""
+NEXT = 2
+"""Rows (or means) on either side of a turn that may lie on the other ..."""
+UNSEEN_SDS = 4.0
+"""... where they are not this many standard deviations (rather more than a quantum), or rms residuals of what
+was fitted to the motion, away from it."""
 
 
-def noise_sd(values: Floats) -> float:
+class Motion(NamedTuple):
+    """Branch code of every row (rows,), and whether it could as well be the other one (rows,)."""
+
+    branch: Ints
+    unclear: Bools
+
+
+def noise_sd(values: Floats, order: int = 2) -> float:
     """Standard deviation of the white noise on a slowly moving signal, shape (rows,) (same unit).
 
-    From second differences, in which steady motion cancels; the largest hundredth (turns, jumps)
-    is left out. 0 for fewer than eight rows.
+    From differences of this order, in which motion cancels that is steady (order 2) or gently changing
+    (above); the largest hundredth (turns, jumps) is left out. 0 for fewer than eight rows.
     """
     if len(values) < 8:
         return 0.0
-    second = np.diff(values, n=2) ** 2
-    kept = second[second <= np.quantile(second, 0.99)]
-    return float(np.sqrt(kept.mean() / 6.0)) if len(kept) else 0.0
+    square = np.diff(values, n=order) ** 2
+    kept = square[square <= np.quantile(square, 0.99)]
+    return float(np.sqrt(kept.mean() / comb(2 * order, order))) if len(kept) else 0.0
 
 
 def turning_points(values: Floats, threshold: float) -> Ints:
@@ -81,36 +95,53 @@ def turn_threshold(displacement: Floats) -> float:
     return max(RANGE_SHARE * float(np.ptp(displacement)), NOISE_SDS * noise_sd(displacement))
 
 
-def detect_branch(displacement: Floats, threshold: float, sd: float) -> Ints:
-    """Branch codes from the direction of motion, shape (rows,).
+def read_motion(displacement: Floats, threshold: float, sd: float) -> Motion:
+    """Branches from the direction of motion.
 
     ``displacement`` (rows in time order, one file, shortening positive); ``threshold`` as from
     :func:`turn_threshold`, ``sd`` the encoder's noise. Held rows take the branch of the motion
-    before them, rows before the first motion NO_BRANCH.
+    before them, rows before the first motion NO_BRANCH. Next to a turn, or to the end of a hold, a row is
+    unclear where noise, the encoder's quantum or an unusual motion hide whether it moves already.
     """
     branch = np.full(len(displacement), NO_BRANCH, dtype=np.int64)
+    unclear = np.zeros(len(displacement), dtype=bool)
     extremes = turning_points(displacement, threshold)
     if len(extremes) < 2:
-        return branch
+        return Motion(branch, unclear)
     margin = max(0.4 * threshold, LEAVE_SDS * sd)
+    unseen = UNSEEN_SDS * min(sd, noise_sd(displacement, 4))
     starts, codes = [], []
     before = int(extremes[0])
     for first, last in pairwise(extremes):
         rise = displacement[last] - displacement[first]
         codes.append(UNLOADING if rise > 0 else LOADING)
         turn = _turn(displacement[before : last + 1], int(first) - before, margin)
-        after_hold = int(first) + _departure(displacement[first : last + 1], margin)
-        starts.append(after_hold if turn is None else before + turn)
+        origin = before
+        if turn is None:
+            turn, origin = _departure(displacement[first : last + 1], margin), int(first)
+        starts.append(origin + turn.row)
+        beside = np.arange(max(starts[-1] - turn.reach, 0), min(starts[-1] + turn.reach, len(branch)))
+        unclear[beside] |= np.abs(displacement[beside] - turn.at) <= max(unseen, UNSEEN_SDS * turn.rms)
         before = int(first)
     if starts[0] <= max(3, 0.08 * (extremes[1] - extremes[0])):
+        unclear[: starts[0] + NEXT] = False
         starts[0] = 0  # in motion from the first row, if gently
     for start, end, code in zip(starts, [*starts[1:], len(branch)], codes, strict=True):
         branch[start:end] = code
-    return branch
+    return Motion(branch, unclear)
 
 
-def _turn(strokes: Floats, extreme: int, margin: float) -> int | None:
-    """The first row after the turn between two strokes; None where the crosshead was held there for long.
+class Turn(NamedTuple):
+    """First row of a stroke, where the crosshead rested, how well that fits, and how many rows to doubt."""
+
+    row: int
+    at: float
+    rms: float
+    reach: int
+
+
+def _turn(strokes: Floats, extreme: int, margin: float) -> Turn | None:
+    """The turn between two strokes; None where the crosshead was held there for long.
 
     It lies where the two strokes meet, or at the end of the hold between them: so even the rows next to it,
     where the crosshead hardly moves, find their side.
@@ -133,59 +164,69 @@ def _turn(strokes: Floats, extreme: int, margin: float) -> int | None:
     def within(row: int) -> float:
         return (row - first - 0.5 * (merged - 1)) / merged
 
-    begin, end = _rest(values, within(low), within(high))
-    if merged > 1 and end > begin:
+    rest = _rest(values, within(low), within(high))
+    if merged > 1 and rest.end > rest.begin:
         return None
-    found = first + 0.5 * (merged - 1) + merged * end
-    return int(np.clip(np.floor(found) + 1, low + 1, high))
+    found = first + 0.5 * (merged - 1) + merged * rest.end
+    return Turn(int(np.clip(np.floor(found) + 1, low + 1, high)), rest.at, rest.rms, NEXT * merged)
 
 
-def _rest(values: Floats, low: float, high: float) -> tuple[float, float]:
-    """Where (in rows, between ``low`` and ``high``) one stroke comes to rest and where the next one leaves.
+class Rest(NamedTuple):
+    """Where (in rows) one stroke comes to rest and the next one leaves, at which value; residuals' rms."""
+
+    begin: float
+    end: float
+    at: float
+    rms: float
+
+
+def _rest(values: Floats, low: float, high: float) -> Rest:
+    """Where, between the rows ``low`` and ``high``, one stroke comes to rest and where the next one leaves.
 
     Least squares of x = x_turn + k·|row − begin|ᵖ before and k'·|row − end|ᵖ after, with p = 1 (full speed
     into the turn and out of it) or 2 (gently). Both are one place, the turn, unless a hold between them fits
     surely better.
     """
     n = len(values)
-    met, least = _search(values, low, high, held=False)
-    held, lower = _search(values, low, high, held=True)
-    floor = (TINY * float(np.ptp(values))) ** 2 * n
-    better = n * np.log((least + floor) / (lower + floor))
-    return held if held[1] - held[0] >= SHORTEST and better > SURE else met
+    met = _search(values, low, high, held=False)
+    held = _search(values, low, high, held=True)
+    floor = TINY * float(np.ptp(values))
+    better = n * np.log((met.rms**2 + floor**2) / (held.rms**2 + floor**2))
+    return held if held.end - held.begin >= SHORTEST and better > SURE else met
 
 
-def _search(values: Floats, low: float, high: float, *, held: bool) -> tuple[tuple[float, float], float]:
-    """The best (begin, end) of :func:`_rest` and the sum of squares that it leaves."""
+def _search(values: Floats, low: float, high: float, *, held: bool) -> Rest:
+    """The best fit of :func:`_rest` with or without a hold."""
     rows = np.arange(len(values), dtype=np.float64)
     span = max(len(values) - 1, 1)
     one, two = np.divmod(np.arange(PLACES**2), PLACES) if held else (np.arange(2 * PLACES),) * 2
     share = np.linspace(-0.5, 0.5, PLACES if held else 2 * PLACES)
-    best, least = (0.5 * (low + high),) * 2, np.inf
+    middle = 0.5 * (low + high)
+    best = Rest(middle, middle, float(values[int(np.clip(middle, 0, len(values) - 1))]), np.inf)
     for power in (1, 2):  # each on its own: on a coarse grid the wrong one may look better
-        place, reached, width = (0.5 * (low + high),) * 2, np.inf, high - low
+        own, width = best._replace(begin=middle, end=middle, rms=np.inf), high - low
         for _ in range(ZOOMS):
             begin, end = np.clip(
-                np.stack([place[0] + width * share[one], place[1] + width * share[two]]), low, high
+                np.stack([own.begin + width * share[one], own.end + width * share[two]]), low, high
             )
             end = np.maximum(begin, end)
             before = np.maximum(begin[:, None] - rows, 0.0) / span
             after = np.maximum(rows - end[:, None], 0.0) / span
             X = np.stack([np.ones_like(before), before**power, after**power], axis=-1)
             turned = np.swapaxes(X, 1, 2)
-            k = np.linalg.solve(turned @ X + 1e-9 * np.eye(3), turned @ values[:, None])
-            left = np.sum((values - (X @ k)[..., 0]) ** 2, axis=1)
-            i = int(left.argmin())
-            if left[i] < reached:
-                place, reached = (float(begin[i]), float(end[i])), float(left[i])
+            k = np.linalg.solve(turned @ X + 1e-9 * np.eye(3), turned @ values[:, None])[..., 0]
+            rms = np.sqrt(np.mean((values - np.einsum("brk,bk->br", X, k)) ** 2, axis=1))
+            i = int(rms.argmin())
+            if rms[i] < own.rms:
+                own = Rest(float(begin[i]), float(end[i]), float(k[i, 0]), float(rms[i]))
             width = 3.0 * width / PLACES
-        if reached < least:
-            best, least = place, reached
-    return best, least
+        if own.rms < best.rms:
+            best = own
+    return best
 
 
-def _departure(stroke: Floats, margin: float) -> int:
-    """The row at which a stroke leaves the hold at its beginning, because the noise hides the first steps.
+def _departure(stroke: Floats, margin: float) -> Turn:
+    """Where a stroke leaves the hold at its beginning, because the noise hides the first steps.
 
     Found where the motion between one and two margins away, at full speed or gently begun, meets the hold.
     """
@@ -195,8 +236,8 @@ def _departure(stroke: Floats, margin: float) -> int:
     last = min(max(at_far + 1, at_near + SIDE), len(stroke) - 1)
     # Gently begun, the way to one margin takes 2.4 times as long as from there to two.
     first = max(at_near - 4 * (last - at_near), 0)
-    ((start, _), _) = _search(travel[first : last + 1], 0.0, float(at_near + 1 - first), held=False)
-    return int(np.clip(np.floor(first + start) + 1, 0, at_near + 1))
+    rest = _search(stroke[first : last + 1], 0.0, float(at_near + 1 - first), held=False)
+    return Turn(int(np.clip(np.floor(first + rest.begin) + 1, 0, at_near + 1)), rest.at, rest.rms, NEXT)
 
 
 def run_ids(*labels: Ints) -> Ints:
@@ -236,6 +277,21 @@ def number_cycles(level: Ints, clock: Ints, branch: Ints) -> Ints:
         place = here
         numbers[i] = counts[here[0]]
     return _fill_gaps(numbers, level[starts])[runs]
+
+
+def cycles_at_turns(cycle: Ints, run: Ints, branch: Ints) -> Ints:
+    """Cycle numbers (rows,) whose changes are moved to the turn beside them, as far as turns are uncertain.
+
+    Else the row or two between the two would be a stroke of their own.
+    """
+    moved = cycle.copy()
+    turns = np.flatnonzero(np.diff(branch)) + 1
+    for change in np.flatnonzero((np.diff(cycle) != 0) & (np.diff(run) == 0)) + 1:
+        beside = turns[np.abs(turns - change) <= NEXT]
+        if len(beside):
+            turn = int(beside[np.abs(beside - change).argmin()])
+            moved[min(turn, change) : max(turn, change)] = cycle[change if turn < change else change - 1]
+    return moved
 
 
 def _fill_gaps(numbers: Ints, levels: Ints) -> Ints:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +34,9 @@ class Loops:
 
     ``stroke`` numbers the contiguous runs of one file, level, cycle and branch, from 0; ``clock``
     numbers the files, because each file has its own clock; ``averaged`` is how many consecutive
-    rows of a very large file each entry stands for (1 otherwise). ``temperature_C`` is there only
-    where every loops file has the column.
+    rows of a very large file each entry stands for (1 otherwise). ``unclear`` rows, at turns, tell of the
+    motion, but their force may belong to the other branch. ``temperature_C`` is there only where every
+    loops file has the column.
     """
 
     time_s: Floats
@@ -48,7 +50,30 @@ class Loops:
     clock: Ints
     censored: Bools
     averaged: int = 1
+    unclear: Bools | None = None
     temperature_C: Floats | None = None
+
+    @property
+    def strokes(self) -> tuple[Ints, Ints]:
+        """First row and number of rows of each stroke."""
+        first = np.flatnonzero(np.diff(self.stroke, prepend=self.stroke[0] - 1))
+        return first, np.diff(np.append(first, len(self.stroke)))
+
+    @property
+    def clear(self) -> Loops:
+        """The loops without their unclear rows."""
+        return self if self.unclear is None else self.without(self.unclear)
+
+    def without(self, rows: Bools) -> Loops:
+        """The loops without some of their rows (rows,)."""
+        if not rows.any():
+            return self
+        arrays: dict[str, Any] = {
+            f.name: value[~rows]
+            for f in fields(self)
+            if isinstance(value := getattr(self, f.name), np.ndarray)
+        }
+        return replace(self, **arrays)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from mpam_calib.specimen.motion import detect_branch, noise_sd, turn_threshold
+from mpam_calib.specimen.motion import noise_sd, read_motion, turn_threshold
 from mpam_calib.specimen.recording import Bools, Floats
 
 ROWS_KEPT = 250_000
@@ -57,7 +57,7 @@ def _cuts(frame: pd.DataFrame) -> Bools:
     cuts[1:] |= _steps(frame["pressure_kPa"].to_numpy())
     displacement = frame["displacement_mm"].to_numpy()
     cuts[1:] |= _steps(displacement)
-    branch = detect_branch(displacement, turn_threshold(displacement), noise_sd(displacement))
+    branch = read_motion(displacement, turn_threshold(displacement), noise_sd(displacement)).branch
     cuts[1:] |= np.diff(branch) != 0
     return cuts
 

@@ -13,7 +13,7 @@ from scipy import stats
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.repeat import repeating_rms
-from mpam_calib.criticism.rows import saturated, without
+from mpam_calib.criticism.rows import saturated
 from mpam_calib.criticism.structure import structure_tests
 from mpam_calib.specimen import Specimen
 
@@ -99,7 +99,7 @@ def test_a_saturated_cell_is_seen_and_left_out(specimen: Specimen) -> None:
     found = saturated(clipped)
     assert found.mean() == pytest.approx(0.03, abs=0.005)
     assert np.all(clipped.force_N[found] == limit)
-    assert without(clipped, found).force_N.max() < limit
+    assert clipped.without(found).force_N.max() < limit
     # A coarse converter repeats every value: that is no saturation.
     step = 0.1 * float(np.ptp(loops.force_N)) / 2.0
     assert not saturated(replace(loops, force_N=step * np.round(loops.force_N / step))).any()

@@ -59,6 +59,24 @@ def test_pressure_changed_during_a_hold(tmp_path: Path) -> None:
     assert (loops_of(specimen).level == (pressure > 100.0)).all()
 
 
+def test_rows_without_a_sure_branch_are_left_out(tmp_path: Path) -> None:
+    """Holds under a coarse encoder: all other rows have their branch; a column branch leaves none unclear."""
+    recording = loops((50.0, 150.0), cycles=2, rate=20.0, dwell=10, quantum=0.05)
+    specimen = read(make(tmp_path / "without", loops=recording.text()))
+    found = loops_of(specimen)
+    assert found.unclear is not None
+    assert 0 < found.unclear.sum() < 4 * 8
+    assert (found.branch == recording.branch)[~found.unclear].all()
+    (note,) = specimen.notes
+    assert note.startswith(f"loops: {found.unclear.sum()} readings at turns and ends of holds are left out")
+    header, *lines = recording.text().splitlines()
+    names = {1: "loading", -1: "unloading"}
+    lines = [f"{line},{names[int(b)]}" for line, b in zip(lines, recording.branch, strict=True)]
+    given = read(make(tmp_path / "with", loops="\n".join([f"{header},branch", *lines]) + "\n"))
+    assert loops_of(given).unclear is None
+    assert not given.notes
+
+
 def test_setpoints_only_group(tmp_path: Path) -> None:
     recording = loops((50.0, 52.0), rate=20.0)
     header = "time_s,pressure_kPa,displacement_mm,force_N,setpoint_kPa"
