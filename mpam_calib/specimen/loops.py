@@ -63,7 +63,7 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
     level, (branch, unclear) = _levels_and_motion(frames, clock, "setpoint_kPa" in everywhere)
     if unclear.any():
         notes.append(
-            f"loops: {int(unclear.sum())} readings at turns and ends of holds are left out: their "
+            f"loops: {int(unclear.sum())} readings at turns and beside holds are left out: their "
             "displacement does not tell the branch (a column branch would)"
         )
     rows = pd.concat([frame[sorted(everywhere)] for frame in frames], ignore_index=True)

@@ -100,8 +100,9 @@ def read_motion(displacement: Floats, threshold: float, sd: float) -> Motion:
 
     ``displacement`` (rows in time order, one file, shortening positive); ``threshold`` as from
     :func:`turn_threshold`, ``sd`` the encoder's noise. Held rows take the branch of the motion
-    before them, rows before the first motion NO_BRANCH. Next to a turn, or to the end of a hold, a row is
-    unclear where noise, the encoder's quantum or an unusual motion hide whether it moves already.
+    before them, rows before the first motion NO_BRANCH: unclear, because friction then holds whatever came
+    before. So is a row next to a turn, or to the end of a hold, where noise, the encoder's quantum or an
+    unusual motion hide whether it moves already.
     """
     branch = np.full(len(displacement), NO_BRANCH, dtype=np.int64)
     unclear = np.zeros(len(displacement), dtype=bool)
@@ -126,6 +127,7 @@ def read_motion(displacement: Floats, threshold: float, sd: float) -> Motion:
     if starts[0] <= max(3, 0.08 * (extremes[1] - extremes[0])):
         unclear[: starts[0] + NEXT] = False
         starts[0] = 0  # in motion from the first row, if gently
+    unclear[: starts[0]] = True
     for start, end, code in zip(starts, [*starts[1:], len(branch)], codes, strict=True):
         branch[start:end] = code
     return Motion(branch, unclear)

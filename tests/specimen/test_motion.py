@@ -170,8 +170,9 @@ def trapezoid() -> tuple[np.ndarray, np.ndarray]:
 
 def test_rows_before_the_first_motion_have_no_branch() -> None:
     x = np.concatenate([np.zeros(300), np.linspace(0.0, 10.0, 500)])
-    found = read_motion(x, turn_threshold(x), noise_sd(x)).branch
-    assert (found[:299] == 0).all() and (found[302:] == -1).all()
+    found = read_motion(x, turn_threshold(x), noise_sd(x))
+    assert (found.branch[:299] == 0).all() and (found.branch[302:] == -1).all()
+    assert found.unclear[:299].all() and not found.unclear[302:].any()
 
 
 def test_a_hold_in_mid_stroke_belongs_to_the_stroke() -> None:

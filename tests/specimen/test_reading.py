@@ -68,7 +68,7 @@ def test_rows_without_a_sure_branch_are_left_out(tmp_path: Path) -> None:
     assert 0 < found.unclear.sum() < 4 * 8
     assert (found.branch == recording.branch)[~found.unclear].all()
     (note,) = specimen.notes
-    assert note.startswith(f"loops: {found.unclear.sum()} readings at turns and ends of holds are left out")
+    assert note.startswith(f"loops: {found.unclear.sum()} readings at turns and beside holds are left out")
     header, *lines = recording.text().splitlines()
     names = {1: "loading", -1: "unloading"}
     lines = [f"{line},{names[int(b)]}" for line, b in zip(lines, recording.branch, strict=True)]
