@@ -58,6 +58,8 @@ def _profiles(rows: Rows, residual: Array, here: NDArray[np.bool_]) -> Array | N
     """Detrended residuals of a branch's strokes on one grid of positions, (strokes, grid)."""
     strokes, counts = np.unique(rows.stroke[here], return_counts=True)
     strokes = strokes[counts >= FEWEST]
+    moves = [np.ptp(rows.readings.displacement[rows.stroke == s]) > 0.0 for s in strokes]
+    strokes = strokes[np.array(moves, dtype=bool)]
     if len(strokes) < 3:
         return None
     reach = float(np.quantile([rows.readings.displacement[rows.stroke == s].max() for s in strokes], 0.1))

@@ -23,15 +23,16 @@ WINDOW = 96
 """Rows around a turn, at most, that are looked at one by one; of more, means of as many."""
 PLACES, ZOOMS = 17, 4
 """Places tried at once for a hold's beginning and for its end, and how often the search narrows."""
-SHORTEST, SURE = 1.0, 20.0
-"""Rows that a hold lasts at least, and twice the log likelihood by which it must fit better than none."""
+SHORTEST, SURE, IN_DOUBT = 1.0, 20.0, 5.0
+"""Rows that a hold lasts at least, and twice the log likelihood by which it must fit better than none: to be
+believed, and to be thought of."""
 TINY = 1e-12
 """Share of a window's range that passes for an exact fit."""
 NEXT = 2
 """Rows (or means) on either side of a turn that may lie on the other ..."""
-UNSEEN_SDS = 4.0
-"""... where they are not this many standard deviations (rather more than a quantum), or rms residuals of what
-was fitted to the motion, away from it."""
+UNSEEN_SDS, UNSEEN_RMS = 4.0, 4.0
+"""... where they are not so many standard deviations (rather more than a quantum), nor so many times what the
+fitted motion leaves, away from it (a hold of less than a row leaves little)."""
 
 
 class Motion(NamedTuple):
@@ -122,7 +123,7 @@ def read_motion(displacement: Floats, threshold: float, sd: float) -> Motion:
             turn, origin = _departure(displacement[first : last + 1], margin), int(first)
         starts.append(origin + turn.row)
         beside = np.arange(max(starts[-1] - turn.reach, 0), min(starts[-1] + turn.reach, len(branch)))
-        unclear[beside] |= np.abs(displacement[beside] - turn.at) <= max(unseen, UNSEEN_SDS * turn.rms)
+        unclear[beside] |= np.abs(displacement[beside] - turn.at) <= max(unseen, UNSEEN_RMS * turn.rms)
         before = int(first)
     if starts[0] <= max(3, 0.08 * (extremes[1] - extremes[0])):
         unclear[: starts[0] + NEXT] = False
@@ -158,6 +159,8 @@ def _turn(strokes: Floats, extreme: int, margin: float) -> Turn | None:
     first, last = max(min(far, extreme - SIDE), 0), min(max(farther, extreme + SIDE), len(strokes) - 1)
     merged = -(-(last + 1 - first) // WINDOW)
     if merged > 1:
+        # Means of a long hold's rows must not swallow the few that the motion beside it takes.
+        first, last = max(first - SIDE * merged, 0), min(last + SIDE * merged, len(strokes) - 1)
         count = (last + 1 - first) // merged
         values = strokes[first : first + count * merged].reshape(count, merged).mean(axis=1)
     else:
@@ -194,7 +197,10 @@ def _rest(values: Floats, low: float, high: float) -> Rest:
     held = _search(values, low, high, held=True)
     floor = TINY * float(np.ptp(values))
     better = n * np.log((met.rms**2 + floor**2) / (held.rms**2 + floor**2))
-    return held if held.end - held.begin >= SHORTEST and better > SURE else met
+    if better > SURE and held.end - held.begin >= SHORTEST:
+        return held
+    # A short one cannot be told from another gentleness; but then a row lies where it would be.
+    return met._replace(at=held.at) if better > IN_DOUBT else met
 
 
 def _search(values: Floats, low: float, high: float, *, held: bool) -> Rest:
