@@ -26,6 +26,8 @@ PLACES, ZOOMS = 17, 4
 SHORTEST, SURE, IN_DOUBT = 1.0, 20.0, 5.0
 """Rows that a hold lasts at least, and twice the log likelihood by which it must fit better than none: to be
 believed, and to be thought of."""
+LONG = 4
+"""Times the rows of the motion beside it that a sure hold takes (a gentle turn takes about as many)."""
 TINY = 1e-12
 """Share of a window's range that passes for an exact fit."""
 NEXT = 2
@@ -156,6 +158,8 @@ def _turn(strokes: Floats, extreme: int, margin: float) -> Turn | None:
     if len(ends) < 2:
         return None
     (low, high), (far, farther) = ends
+    if high - low > max(WINDOW, LONG * (low - far + farther - high)):
+        return None
     first, last = max(min(far, extreme - SIDE), 0), min(max(farther, extreme + SIDE), len(strokes) - 1)
     merged = -(-(last + 1 - first) // WINDOW)
     if merged > 1:

@@ -78,6 +78,16 @@ def test_noise_does_not_repeat(name: str) -> None:
     assert repeating_rms(problem.rows, problem.blueprint.model_dump_json(), fitted) == 0.0
 
 
+def test_a_stroke_that_does_not_move_is_left_out(null: tuple[Problem, Fit]) -> None:
+    problem, fitted = null
+    assert problem.rows is not None
+    x = problem.rows.readings.displacement.copy()
+    stroke = np.unique(problem.rows.stroke)[2]
+    x[problem.rows.stroke == stroke] = 0.001
+    rows = replace(problem.rows, readings=replace(problem.rows.readings, displacement=x))
+    assert np.isfinite(repeating_rms(rows, problem.blueprint.model_dump_json(), fitted))
+
+
 def test_a_ripple_of_the_drive_repeats(null: tuple[Problem, Fit]) -> None:
     """A ripple with the size of the noise, finer than the reduced rows, comes out with its size."""
     problem, fitted = null

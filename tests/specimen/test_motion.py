@@ -113,6 +113,17 @@ def test_a_hold_goes_with_the_stroke_before_it(gentle: bool, ratio: float, rows:
     assert np.mean(wrong) / 5 < 0.3
 
 
+def test_fast_strokes_between_long_holds() -> None:
+    """Of 14 rows each between holds of 400: in means of a hold's rows they must not be lost."""
+    for rows, hold in ((14, 400), (8, 1500), (30, 250)):
+        way = np.concatenate([(np.arange(rows) + 0.4) / rows, np.ones(hold)])
+        x = 5.556 * np.concatenate([way, 1.0 - way] * 3)
+        truth = np.repeat([-1, 1] * 3, rows + hold)
+        found = read_motion(x, turn_threshold(x), noise_sd(x))
+        assert (found.branch == truth)[~found.unclear].all()
+        assert found.unclear.sum() <= 6 * 3
+
+
 def test_a_hold_ends_at_its_last_row_however_the_encoder_rustles() -> None:
     """Reached and left halfway between two rows at full speed; noise of a ten-thousandth of the stroke."""
     rng = np.random.default_rng(5)
