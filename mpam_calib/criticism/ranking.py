@@ -1,8 +1,8 @@
 """A space of models ranked by evidence: Laplace's for all of them, quadrature for those near the top.
 
-The evidence of a model is summed over the remainder's sizes. Models that differ in their law alone are
-fitted one after the other: a law with rates of its own for each modulus starts its climb where the law with
-shared rates ended.
+The evidence of a model is summed over the remainder's sizes. Of models that differ in their law alone those
+without rates are fitted first: the moduli free at each level tell where the others' rates may be
+(:mod:`mpam_calib.criticism.rates`).
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ from dataclasses import dataclass, replace
 from math import log, pi, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import linalg
 
 from mpam_calib.criticism.evidence import log_evidence_by_quadrature
-from mpam_calib.criticism.fit import Fit, fit
+from mpam_calib.criticism.fit import Fit, chain_for, fit
 from mpam_calib.criticism.noise_scale import settle_noise
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
+from mpam_calib.criticism.rates import Rates, find_rates
 from mpam_calib.criticism.spread import Spread, held_problem, spread_over
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.moduli import rate_names
@@ -26,16 +28,16 @@ from mpam_calib.specimen.declaration import Simulation
 
 NEAR = 10.0
 """Nats below the best within which Laplace's evidence is replaced by quadrature."""
+PROMISING = 60.0
+"""Nats below the best model so far within which a law's rates are searched for all their modes."""
+CLOSE, AGAIN = 30.0, 4
+"""Nats below the best within which rates of each modulus's own are searched again, so many times."""
 SILENT = 300.0
 """Nats below a larger remainder at which still smaller ones are not tried."""
 CHANCE = 3.0
 """Standard deviations of chi-squared beyond which a better fit is no chance."""
-SHARED, EACH = "exponential", "exponential_each"
-STARTS: dict[str, tuple[dict[str, float], ...]] = {
-    SHARED: ({"d": 1.0, "gap": -1.0}, {"d": -1.0, "gap": -1.0})
-}
-"""Coordinates from which a law's climbs start, besides the middle of the priors."""
-
+FREE, SHARED, EACH = "free", "exponential", "exponential_each"
+Array = NDArray[np.float64]
 Start = dict[str, float]
 
 
@@ -88,13 +90,14 @@ def rank_spread(
     if not ranked:
         return []
     top = max(r.log_evidence for r in ranked)
-    tasks = [
-        (group, found.get("free"), _hopeful(found, top) or any(always(s) for s in group.values()))
-        for group, found in zip(groups, plain, strict=True)
-    ]
+    tasks = []
+    for group, found in zip(groups, plain, strict=True):
+        worth = top - PROMISING if _hopeful(found, top) else np.inf
+        tasks.append((group, found.get(FREE), -np.inf if any(always(s) for s in group.values()) else worth))
     for number, rated in enumerate(spread(_fit_rates, tasks)):
         ranked += rated
         tell("ranking", 0.5 + (number + 1) / len(tasks) / 2)
+    ranked = _searched_again(spread, ranked)
     near = max(r.log_evidence for r in ranked) - NEAR
     wanted = [i for i, r in enumerate(ranked) if r.log_evidence >= near or always(r.simulation)]
     for number, (i, better) in enumerate(
@@ -105,27 +108,50 @@ def rank_spread(
     return sorted(ranked, key=lambda r: -r.log_evidence)
 
 
+def _searched_again(spread: Spread, ranked: list[Ranked]) -> list[Ranked]:
+    """The models whose many rates could yet make them the best, with the best of further searches.
+
+    Their modes are too many for any one search to find the best.
+    """
+    close = max(r.log_evidence for r in ranked) - CLOSE
+    wanted = [i for i, r in enumerate(ranked) if r.simulation.law == EACH and r.log_evidence >= close]
+    free = {s.simulation.model_dump_json(): s for s in ranked if s.simulation.law == FREE}
+    like = [ranked[i].simulation.model_copy(update={"law": FREE}).model_dump_json() for i in wanted]
+    seeds = range(1, 1 + AGAIN)
+    tasks = [(ranked[i], free.get(key), seed) for i, key in zip(wanted, like, strict=True) for seed in seeds]
+    found = list(spread(_search_again, tasks))
+    for number, i in enumerate(wanted):
+        ranked[i] = max([ranked[i], *found[number * AGAIN : (number + 1) * AGAIN]], key=_evidence)
+    return ranked
+
+
 def blueprint_of(problem: Problem, simulation: Simulation) -> Blueprint:
     """The problem's blueprint with another simulation."""
     return problem.blueprint.model_copy(update={"simulation": simulation})
 
 
 def fitted(
-    problem: Problem, simulation: Simulation, shared: Ranked | None = None, thorough: bool = True
+    problem: Problem,
+    simulation: Simulation,
+    free: Ranked | None = None,
+    worth: float = -np.inf,
+    seed: int = 0,
 ) -> Ranked | None:
     """A model with Laplace's evidence; None where no climb ends.
 
-    ``shared`` is the same model with rates that all moduli share, for a law with rates of their own. A
-    ``thorough`` search for the rates takes several ways.
+    ``free`` is the same model with moduli free at each level, which a law with rates starts from; their
+    further modes are looked for where about this evidence (nats) makes it ``worth`` while.
     """
-    if simulation.law == EACH and shared is None:
-        shared = fitted(problem, simulation.model_copy(update={"law": SHARED}))
+    if rate_names(simulation.law, simulation.order) and free is None:
+        free = fitted(problem, simulation.model_copy(update={"law": FREE}))
     with warnings.catch_warnings():
         # Where a model is hopeless, its misfit outweighs every prior: nothing to be warned of.
         warnings.simplefilter("ignore", linalg.LinAlgWarning)
-        fits = _climbs(problem, simulation, shared, thorough)
-    if not fits:
-        return None
+        fits = _climbs(problem, simulation, free, worth, seed)
+    return _ranked(problem, simulation, fits) if fits else None
+
+
+def _ranked(problem: Problem, simulation: Simulation, fits: list[Fit]) -> Ranked:
     terms = [f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits]
     n = len(problem)
     reached = [-0.5 * (f.chi2 + problem.log_dets[f.size] + n * log(2.0 * pi)) for f in fits]
@@ -139,53 +165,49 @@ def integrated(ranked: Ranked) -> Ranked:
     return replace(ranked, log_evidence=value)
 
 
-def _climbs(problem: Problem, simulation: Simulation, shared: Ranked | None, thorough: bool) -> list[Fit]:
+def _climbs(
+    problem: Problem, simulation: Simulation, free: Ranked | None, worth: float, seed: int
+) -> list[Fit]:
     """The best fit for each size of the remainder, from the largest down to where they have no more to say.
 
-    Rates are found on the way down, which the larger remainder smooths; then back, each from the mode that
-    the size before it has.
+    Rates are looked for with the largest remainder, which smooths, and go on from there to the others.
     """
     blueprint = blueprint_of(problem, simulation)
+    targets = _rates_by_size(problem, simulation, free)
     found: dict[int, Fit] = {}
-
-    def climb(size: int, starts: list[Start]) -> None:
-        for start in starts:
-            try:
-                new = fit(problem, frozenset(), size, start, blueprint)
-            except np.linalg.LinAlgError:
-                continue
-            if size not in found or new.log_evidence > found[size].log_evidence:
-                found[size] = new
-
-    rates = rate_names(simulation.law, simulation.order)
+    known: Array | None = None
     for size in reversed(range(len(SIZES))):
-        starts = _from_shared(shared, simulation, size)
-        if thorough or not starts:
-            starts += _at(found.get(size + 1)) if rates else []
-        if not starts:
-            starts = [{}, *(STARTS.get(simulation.law, ()) if thorough else ())]
-        elif rates and thorough and not found:
-            starts.append({})
-        climb(size, starts)
-        if size in found and found[size].log_evidence < max(f.log_evidence for f in found.values()) - SILENT:
+        start = _at(found.get(size + 1))
+        if size in targets:
+            if known is None or worth < np.inf:
+                known = find_rates(targets[size], known, worth, seed)
+            start = targets[size].start(known[0])
+        try:
+            new = fit(problem, frozenset(), size, start, blueprint)
+        except np.linalg.LinAlgError:
+            continue
+        found[size] = new
+        if known is not None:
+            known = np.concatenate([new.u[None, -known.shape[1] :], known])
+        if new.log_evidence < max(f.log_evidence for f in found.values()) - SILENT:
             break
-    for size in sorted(found)[1:] if rates and thorough else ():
-        climb(size, _at(found.get(size - 1)))
     return [found[size] for size in sorted(found)]
 
 
-def _at(found: Fit | None) -> list[Start]:
-    """The start that another fit of the same model gives."""
-    return [] if found is None else [dict(zip(found.names, found.u.tolist(), strict=True))]
+def _at(found: Fit | None) -> Start:
+    """Where another fit of the same model ended."""
+    return {} if found is None else dict(zip(found.names, found.u.tolist(), strict=True))
 
 
-def _from_shared(shared: Ranked | None, simulation: Simulation, size: int) -> list[Start]:
-    """The start that the shared rates' fit gives for this size of the remainder."""
-    if simulation.law != EACH or shared is None:
-        return []
-    rates = rate_names(EACH, simulation.order)
-    starts = [start for f in shared.fits if f.size == size for start in _at(f)]
-    return [at | {name: at[name.split("_")[0]] for name in rates} for at in starts]
+def _rates_by_size(problem: Problem, simulation: Simulation, free: Ranked | None) -> dict[int, Rates]:
+    """What the free moduli say of the rates, by size of the remainder; nothing where there are no rates."""
+    if free is None or not rate_names(simulation.law, simulation.order):
+        return {}
+    law, other = (
+        chain_for(blueprint_of(problem, s).model_dump_json(), frozenset())
+        for s in (simulation, free.simulation)
+    )
+    return {f.size: Rates(law, other, f) for f in free.fits}
 
 
 def _by_law(space: Sequence[Simulation]) -> list[dict[str, Simulation]]:
@@ -203,17 +225,35 @@ def _fit_plain(group: dict[str, Simulation]) -> dict[str, Ranked | None]:
     return {law: fitted(problem, s) for law, s in group.items() if law not in (SHARED, EACH)}
 
 
-def _fit_rates(task: tuple[dict[str, Simulation], Ranked | None, bool]) -> list[Ranked]:
-    """The laws with rates of a group, searched thoroughly or not; ``free`` is the group's free law."""
-    group, free, thorough = task
+def _fit_rates(task: tuple[dict[str, Simulation], Ranked | None, float]) -> list[Ranked]:
+    """The laws with rates of a group; ``free`` is the group's free law, ``worth`` as in :func:`fitted`."""
+    group, free, worth = task
     problem = held_problem()
-    found: dict[str, Ranked | None] = {}
+    found: list[Ranked] = []
     for law in (SHARED, EACH):
         if law in group:
-            shared = found.get(SHARED)
-            search = thorough and (free is None or shared is None or not _says_all(shared, free))
-            found[law] = fitted(problem, group[law], shared, search)
-    return [r for r in found.values() if r is not None]
+            all_said = free is not None and bool(found) and _says_all(found[0], free)
+            rated = fitted(problem, group[law], free, np.inf if all_said else worth)
+            found += [] if rated is None else [rated]
+    return found
+
+
+def _search_again(task: tuple[Ranked, Ranked | None, int]) -> Ranked:
+    """The better of a model and what another search for its rates finds."""
+    before, free, seed = task
+    problem = held_problem()
+    again = fitted(problem, before.simulation, free, seed=seed)
+    if again is None:
+        return before
+    fits = {f.size: f for f in before.fits}
+    for f in again.fits:
+        if f.size not in fits or f.log_evidence > fits[f.size].log_evidence:
+            fits[f.size] = f
+    return _ranked(problem, before.simulation, [fits[size] for size in sorted(fits)])
+
+
+def _evidence(ranked: Ranked) -> float:
+    return ranked.log_evidence
 
 
 def _says_all(law: Ranked, free: Ranked) -> bool:
@@ -228,7 +268,7 @@ def _hopeful(plain: dict[str, Ranked | None], top: float) -> bool:
     No law of pressure fits the levels better than moduli of each level's own, and no evidence is above the
     best likelihood.
     """
-    free = plain.get("free")
+    free = plain.get(FREE)
     if free is None:
         return True
     return free.ceiling >= top - NEAR

@@ -96,14 +96,10 @@ class Law:
             known = level >= 0
             hats[known] = np.eye(len(self.levels))[level[known]]
             return hats[None, :, :, None]
-        if self.name == "exponential":
-            d, gap = values["d"], values["gap"]
-            return np.stack([_exp(d * P), _exp((d - gap) * P)], axis=-1)[..., None]
-        columns = []
-        for k in range(1, self.order + 1):
-            d, gap = values[f"d_{k}"], values[f"gap_{k}"]
-            columns.append(np.stack([_exp(d * P), _exp((d - gap) * P)], axis=-1))
-        return np.stack(columns, axis=-1)
+        names = ["d"] if self.name == "exponential" else [f"d_{k}" for k in range(1, self.order + 1)]
+        d = np.concatenate([values[name] for name in names], axis=1)[:, None, :]
+        gap = np.concatenate([values[name.replace("d", "gap")] for name in names], axis=1)[:, None, :]
+        return np.stack([_exp(d * P[..., None]), _exp((d - gap) * P[..., None])], axis=2)
 
 
 ALIKE = 1e-10
