@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import random
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from prediction.coverage import as_specimen
 from rig import sets
-from rig.chain import force_of
-from rig.muscle import Law
-from rig.protocol import Protocol, record_rows, sensor_noise
-from rig.specimens import FAMILIES, loops_muscle, sensible, whole_levels
 
 from criticism.order_four import draw_case
+from criticism.own_rates import made_with_rates_of_its_own
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism import ranking, space
 from mpam_calib.criticism import select as module
@@ -106,19 +101,7 @@ def test_a_law_with_rates_of_its_own_is_climbed() -> None:
     Climbs end where the next round promises little (:mod:`mpam_calib.criticism.fit`): along the ridge of the
     rates, where they started decides tenths of a nat.
     """
-    muscle, top = loops_muscle(FAMILIES["thumb"], random.Random(3), law="linear", order=2)
-    constants = tuple((0.8 * e, 0.8 / top * (k + 1), -0.4 * e, -5.0 / top) for k, (_, e) in enumerate(
-        muscle.simulation.law.constants
-    ))  # fmt: skip
-    made = muscle.with_simulation(law=Law("exponential_each", constants))
-    levels = whole_levels((0.4, 0.52, 0.64, 0.76, 0.88, 1.0), top)
-    assert sensible(made, levels)
-    protocol = Protocol(
-        levels, cycles=2, rows_max=1200, noise_N=0.1, correlated_N=0.05, pressure_noise_kPa=0.0
-    )
-    rows = record_rows(protocol, made, 0)
-    reading = force_of(made, rows) + sensor_noise(protocol, rows, 0)
-    specimen = as_specimen(made, rows, reading, protocol)
+    specimen = made_with_rates_of_its_own()
     problem = problem_of(specimen)
     each = specimen.simulation.model_copy(update={"law": "exponential_each"})
     found = ranking.fitted(problem, each)

@@ -1,0 +1,155 @@
+"""The density of a law's rates that the free moduli give, and the search for its modes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rig import sets
+
+from criticism.own_rates import made_with_rates_of_its_own
+from criticism.test_hypotheses import problem_of, specimen_of
+from mpam_calib.criticism import ranking
+from mpam_calib.criticism.climb import Climb
+from mpam_calib.criticism.fit import Fit, chain_for, fit
+from mpam_calib.criticism.problem import Problem
+from mpam_calib.criticism.rates import Rates, find_rates
+from mpam_calib.criticism.spread import Alone
+from mpam_calib.model.blueprint import Blueprint
+
+SIZE = 1
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
+    return problem_of(specimen_of(recipe.name))
+
+
+@pytest.fixture(scope="module")
+def own() -> Problem:
+    return problem_of(made_with_rates_of_its_own())
+
+
+def plain(problem: Problem, law: str, friction: str = "none", order: int = 3) -> Blueprint:
+    simulation = problem.blueprint.simulation.model_copy(
+        update={"law": law, "friction": friction, "order": order, "effects": ()}
+    )
+    return problem.blueprint.model_copy(update={"simulation": simulation})
+
+
+def rates_of(problem: Problem, law: str, friction: str = "none", order: int = 3) -> Rates:
+    blueprint, free = plain(problem, law, friction, order), plain(problem, "free", friction, order)
+    chains = (chain_for(b.model_dump_json(), frozenset()) for b in (blueprint, free))
+    return Rates(*chains, fit(problem, frozenset(), SIZE, None, free))
+
+
+def exact(problem: Problem, law: str, rates: np.ndarray) -> float:
+    """The log density that a climb itself sees at these rates, everything else at its optimum."""
+    climb = Climb(problem, rates_of(problem, law).law, SIZE, np.empty((len(problem), 0)))
+    return climb.look(rates, climb.guide(), np.zeros(climb.chain.linear_size)).objective
+
+
+@pytest.mark.parametrize("law", ["exponential", "exponential_each"])
+def test_density_is_the_fit_s_own_where_levels_are_held(problem: Problem, law: str) -> None:
+    """With nothing but moduli the Gaussian is exact: all rates are equally far from a climb's density."""
+    target = rates_of(problem, law)
+    held = replace(problem, readings=replace(problem.readings, pressure=_held(problem)))
+    target = replace(target, fit=fit(held, frozenset(), SIZE, None, plain(problem, "free")))
+    rates = target.draws(8, seed=1)[-8:]
+    off = target.look(rates).objective - np.array([exact(held, law, u) for u in rates])
+    np.testing.assert_allclose(off, off[0], atol=1e-4 * np.ptp([exact(held, law, u) for u in rates]) + 1e-3)
+
+
+def _held(problem: Problem) -> np.ndarray:
+    """Every reading's pressure at its level, as the free moduli have it."""
+    assert problem.model.setting is not None
+    return problem.model.setting.levels[np.concatenate([problem.level, problem.level])]
+
+
+def test_slopes_are_differences(problem: Problem) -> None:
+    """At fixed coefficients of the law (not coordinates, whose prior changes with the rates)."""
+    target = rates_of(problem, "exponential_each", "coulomb")
+    u, step, d = target.draws(1, seed=2)[-1:], 1e-5, 1
+    here = target.look(u)
+    coefficients = _coefficients(target, here.coordinates[:, d:], u)
+    for i in range(u.shape[1]):
+        moved = u + step * np.eye(u.shape[1])[i]
+        there = target.look(moved)
+        eta = np.linalg.solve(_transform(target, moved), coefficients[..., None])[..., 0]
+        force = there.columns @ np.concatenate([here.coordinates[:, :d], eta], axis=1)[..., None]
+        before = here.columns @ here.coordinates[..., None]
+        change = (force - before)[0, :, 0] / step
+        np.testing.assert_allclose(here.slopes[0, :, i], change, atol=1e-3 * np.abs(change).max())
+
+
+def _transform(target: Rates, u: np.ndarray) -> np.ndarray:
+    assert target.law.moduli is not None
+    priors = {p.name: p.prior for p in target.law.parameters}
+    values = {n: priors[n].from_normal(u[:, i : i + 1]) for i, n in enumerate(target.names)}
+    return target.law.moduli.transform(values)[1]
+
+
+def _coefficients(target: Rates, eta: np.ndarray, u: np.ndarray) -> np.ndarray:
+    return (_transform(target, u) @ eta[..., None])[..., 0]
+
+
+@pytest.mark.parametrize("friction", ["none", "coulomb"])
+def test_predicted_evidence_is_the_fit_s(problem: Problem, friction: str) -> None:
+    """The Gaussian of the free moduli says within a nat what Laplace then finds, starts included."""
+    for law in ("exponential", "exponential_each"):
+        target = rates_of(problem, law, friction, order=2)
+        best = find_rates(target, None, -np.inf)
+        found = fit(problem, frozenset(), SIZE, target.start(best[0]), plain(problem, law, friction, 2))
+        assert _evidence(target, best[:1]) == pytest.approx(found.log_evidence, abs=1.0)
+
+
+def _evidence(target: Rates, rates: np.ndarray) -> float:
+    place = target.look(rates)
+    both = np.concatenate([place.slopes, place.columns], axis=2)[0]
+    hessian = both.T @ both + np.eye(both.shape[1])
+    return target.offset + float(place.objective[0]) - 0.5 * float(np.linalg.slogdet(hessian)[1])
+
+
+def test_a_thorough_search_is_not_beaten_by_many_more_climbs(problem: Problem) -> None:
+    """Eight times as many draws, four times as often, are together at most a nat better."""
+    target = rates_of(problem, "exponential_each", "coulomb", order=3)
+    found = _evidence(target, find_rates(target, None, -np.inf)[:1])
+    quick = _evidence(target, find_rates(target, None, np.inf)[:1])
+    known = np.concatenate([target.draws(128, seed) for seed in range(4)])
+    many = max(
+        _evidence(target, find_rates(target, part, -np.inf, seed=9)[:1]) for part in np.array_split(known, 4)
+    )
+    assert found >= many - 1.0
+    assert found >= quick
+
+
+@pytest.mark.parametrize(("off", "again"), [(5.0, True), (2.0 * ranking.CLOSE, False)])
+def test_only_models_near_the_top_are_searched_again(own: Problem, off: float, again: bool) -> None:
+    """A first search that ended badly does not decide the ranking."""
+    laws = ("free", "exponential_each")
+    free, right = (
+        ranking.fitted(own, own.blueprint.simulation.model_copy(update={"law": law})) for law in laws
+    )
+    assert free is not None
+    assert right is not None
+    top = max(free.log_evidence, right.log_evidence)
+    off += right.log_evidence - top
+    bad = replace(
+        right,
+        fits=[replace(f, log_evidence=f.log_evidence - off) for f in right.fits],
+        log_evidence=right.log_evidence - off,
+    )
+    first = replace(free, log_evidence=top)
+    _, found = ranking._searched_again(Alone(own), [first, bad])
+    assert found.log_evidence == pytest.approx((right if again else bad).log_evidence, abs=0.5)
+
+
+def test_fits_come_from_one_size_each(problem: Problem) -> None:
+    simulation = plain(problem, "exponential_each", "coulomb", 2).simulation
+    found = ranking.fitted(problem, simulation)
+    assert found is not None
+    sizes = [f.size for f in found.fits]
+    assert sizes == sorted(set(sizes))
+    assert all(isinstance(f, Fit) and f.names[-4:] == ("d_1", "gap_1", "d_2", "gap_2") for f in found.fits)
