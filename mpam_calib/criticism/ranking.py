@@ -30,7 +30,7 @@ NEAR = 10.0
 """Nats below the best within which Laplace's evidence is replaced by quadrature."""
 PROMISING = 60.0
 """Nats below the best model so far within which a law's rates are searched for all their modes."""
-CLOSE, AGAIN = 30.0, 4
+CLOSE, AGAIN = 50.0, 4
 """Nats below the best within which rates of each modulus's own are searched again, so many times."""
 SILENT = 300.0
 """Nats below a larger remainder at which still smaller ones are not tried."""
