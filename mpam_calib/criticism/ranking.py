@@ -32,6 +32,8 @@ PROMISING = 60.0
 """Nats below the best model so far within which a law's rates are searched for all their modes."""
 CLOSE, AGAIN = 50.0, 4
 """Nats below the best within which rates of each modulus's own are searched again, so many times."""
+ROUGH = 10.0
+"""Nats by which the fits' evidence may be off where each modulus has rates of its own."""
 SILENT = 300.0
 """Nats below a larger remainder at which still smaller ones are not tried."""
 CHANCE = 3.0
@@ -99,7 +101,11 @@ def rank_spread(
         tell("ranking", 0.5 + (number + 1) / len(tasks) / 2)
     ranked = _searched_again(spread, ranked)
     near = max(r.log_evidence for r in ranked) - NEAR
-    wanted = [i for i, r in enumerate(ranked) if r.log_evidence >= near or always(r.simulation)]
+    wanted = [
+        i
+        for i, r in enumerate(ranked)
+        if r.log_evidence >= near - (ROUGH if r.simulation.law == EACH else 0.0) or always(r.simulation)
+    ]
     for number, (i, better) in enumerate(
         zip(wanted, spread(integrated, [ranked[i] for i in wanted]), strict=True)
     ):
