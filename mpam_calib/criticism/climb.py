@@ -51,7 +51,8 @@ class Place:
     """The force linearised at coordinates ``u`` (d,), with the linear ones ``eta`` (q,) at their optimum.
 
     ``residual`` (n,) and ``J`` (n, d + q) are whitened, ``force`` (n,) is the model's in newtons,
-    ``guide`` (m,) the same at the lean readings; ``objective`` is the log density up to a constant.
+    ``guide`` (m,) the same at the lean readings, where ``turned`` says whether the muscle pulls other than it
+    was taken to; ``objective`` is the log density up to a constant.
     """
 
     u: Array
@@ -60,6 +61,7 @@ class Place:
     J: Array
     force: Array
     guide: Array
+    turned: bool
     objective: float
 
 
@@ -104,7 +106,7 @@ class Climb:
         if self.chain.uses_force:
             points = np.concatenate([points, points[:1]])
             guides = _nudged(guide, len(points), nudge)
-        fixed, slope, columns = self.chain.factored(self.values(points), readings, guides)
+        fixed, slope, columns, beside = self.chain.factored(self.values(points), readings, guides)
         factor = np.ones(1)
         if self.chain.uses_force:
             # A force that depends on itself, F = f(F): one Newton step of its fixed point, for all at once.
@@ -135,6 +137,7 @@ class Climb:
             J=np.concatenate([problem.white(moved.T / STEP, self.size), X], axis=1),
             force=whole[0],
             guide=force[0],
+            turned=not np.array_equal(np.sign(force[0] - beside[0]), np.sign(guide - beside[0])),
             objective=objective if np.isfinite(objective) else -np.inf,
         )
 
@@ -144,13 +147,13 @@ class Climb:
         return SETTLED * self.problem.noise_level.total
 
     def look_with_its_signs(self, u: Array, guide: Array, eta: Array) -> Place:
-        """:meth:`look` with friction against the force's own sign, not against that of the last estimate.
+        """:meth:`look` with friction against the muscle's own pull, not against that of the last estimate.
 
         A place that looked better with the signs of another one would never be left again.
         """
         for _round in range(SIGN_ROUNDS):
             place = self.look(u, guide, eta)
-            if np.array_equal(np.sign(place.guide), np.sign(guide)):
+            if not place.turned:
                 break
             guide, eta = place.guide, place.eta[: self.chain.linear_size]
         return place

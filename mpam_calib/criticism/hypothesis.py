@@ -68,7 +68,7 @@ class Hypothesis:
         """Log posterior density (B,) of coordinates u (B, d)."""
         n, B = len(self.problem), len(u)
         values = {q.name: q.prior.from_normal(u[:, i : i + 1]) for i, q in enumerate(self.parameters)}
-        fixed, slope, columns = self.chain.factored(
+        fixed, slope, columns, _ = self.chain.factored(
             values or {"": np.zeros((B, 1))}, self.problem.readings, self.guide
         )
         fixed = np.broadcast_to(fixed, (B, 2 * n))

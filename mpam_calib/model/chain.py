@@ -43,6 +43,19 @@ class Terms(NamedTuple):
     columns: Array
 
 
+class Factors(NamedTuple):
+    """F = fixed + slope·(columns·η): newtons, shapes (B, n), (B or 1, n) and (B or 1, n, p).
+
+    ``beside`` (B or 1, n) is the part of the fixed force, N, that is none of the muscle's pull: friction that
+    is not in proportion to it, and the load cell's zero.
+    """
+
+    fixed: Array
+    slope: Array
+    columns: Array
+    beside: Array
+
+
 @dataclass(frozen=True)
 class Chain:
     """A declared simulation with its effects, ready to be evaluated for many parameter vectors."""
@@ -93,23 +106,23 @@ class Chain:
         force itself (the sign in Coulomb's law, a fixture's give); without one the muscle pulls and
         the fixture is stiff.
         """
-        fixed, slope, columns = self.factored(values, readings, guide)
+        fixed, slope, columns, _ = self.factored(values, readings, guide)
         return Terms(fixed, np.broadcast_to(slope, fixed.shape)[..., None] * columns)
 
-    def factored(
-        self, values: Values, readings: Readings, guide: Array | None = None
-    ) -> tuple[Array, Array, Array]:
+    def factored(self, values: Values, readings: Readings, guide: Array | None = None) -> Factors:
         """:meth:`terms` as (fixed, slope, columns): F = fixed + slope·(columns·η).
 
         The slope (B or 1, n) is what friction and gain make of the muscle's own force; the columns are
         (1, n, p) where no parameter changes them.
         """
-        known = np.ones(len(readings)) if guide is None else guide
         state, shape = self._to_shape(values, readings, np.zeros(len(readings)) if guide is None else guide)
         fixed, columns = self._statics(state, shape, values)
         state = self._to_sensor(state, values)
-        slope = state.gain * coulomb_factor(state.friction_gain * state.coulomb, state.sign, np.sign(known))
-        return slope * fixed + self._friction_beside(state) + state.zero, slope, columns
+        beside = self._friction_beside(state) + state.zero
+        # Coulomb's law goes by what the muscle itself pulls, not by what the load cell reads.
+        pull = np.ones(1) if guide is None else np.sign(guide - beside)
+        slope = state.gain * coulomb_factor(state.friction_gain * state.coulomb, state.sign, pull)
+        return Factors(slope * fixed + beside, slope, columns, beside)
 
     def force(self, values: Values, eta: Array, readings: Readings) -> Array:
         """Force (B, n), N, for coordinates η (B, p): exact; by secants where it depends on itself."""

@@ -238,7 +238,7 @@ class Collapsed:
         """Bins whose noise is Gaussian and alike in all of them."""
         assert self.model.chain is not None
         white, correlated, time, rough = self._noise(values)
-        fixed, slope, columns = self.model.chain.factored(values, bins.readings, self.guide.bins)
+        fixed, slope, columns, _ = self.model.chain.factored(values, bins.readings, self.guide.bins)
         n, B, p = len(bins), len(white), columns.shape[-1]
         slope = 0.5 * np.broadcast_to(slope, (len(slope), 2 * n))
         known = np.empty((p + 1, B, n))
@@ -301,7 +301,7 @@ class Collapsed:
         assert self.model.chain is not None
         nodes = bins.nodes
         guide = nodes.interpolate(self.guide.bins, bins.readings.time)
-        fixed, slope, columns = self.model.chain.factored(values, nodes.readings, guide)
+        fixed, slope, columns, _ = self.model.chain.factored(values, nodes.readings, guide)
         white = values[WHITE][:, 0]
         piece = white_terms(nodes, bins.averaged, fixed, slope, columns, white)
         return Piece(*piece).widened(sum(self.model.linear_sizes))

@@ -230,6 +230,29 @@ def test_terms_and_force_agree_with_the_right_guide():
         assert again == pytest.approx(force, abs=2e-5 + 1e-9 * np.abs(force).max())
 
 
+@pytest.mark.parametrize(
+    ("friction", "effects", "sizes"),
+    [
+        ("strand", ("coulomb_friction",), {"f_s": 0.5, "K_f": 0.2}),
+        ("coulomb", ("strand_friction",), {"f_s": 0.5, "K_f": 0.2}),
+        ("coulomb", ("force_drift",), {"K_f": 0.2, "drift_N_per_min": 2.0}),
+    ],
+)
+def test_coulomb_s_law_goes_by_the_muscle_s_own_pull(friction, effects, sizes):
+    """Where another friction or the cell's zero turns the reading's sign, terms and force still agree."""
+    rows = record_rows(replace(PROTOCOL, stroke_fraction=1.1), MUSCLE, 1)
+    chain = chain_with(MUSCLE.with_simulation(friction=friction, friction_value=(0.5,)), rows, effects)
+    values = declared_values(MUSCLE) | {
+        name: np.array([[size * si_factor(name)]]) for name, size in sizes.items()
+    }
+    readings, eta = readings_of(rows), np.zeros((1, 1))
+    force = chain.force(values, eta, readings)
+    found = chain.factored(values, readings, force[0])
+    again = found.fixed + found.slope * (found.columns @ eta[0])
+    assert again == pytest.approx(force, abs=1e-9 * np.abs(force).max())
+    assert np.sum(np.sign(force) != np.sign(force - found.beside)) > 5, "no such rows"
+
+
 def test_rest_rows_have_no_history():
     """Bands are for a settled muscle: creep, drift, softening and presliding leave it as it is."""
     history = ("creep", "force_drift", "stress_softening", "presliding", "rate_friction")
