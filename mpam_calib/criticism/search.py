@@ -121,7 +121,13 @@ class Search:
         # made up for what it lacked.
         choice, start = self._from_parts(effects, size)
         forms = tuple(choice[e] for e in sorted(effects))
-        return [(forms, start), (forms, {})]
+        tries: list[Try] = [(forms, start), (forms, {})]
+        if len(effects) == 2:
+            # Alone, a cause may have taken another kind of shape for want of its partner.
+            for e in sorted(effects):
+                others = [f for f in flexible(e) if f != flexible_like(choice[e])]
+                tries += [(tuple((choice | {e: form}).values()), {}) for form in others]
+        return tries
 
     def _from_parts(self, effects: Set, size: int) -> tuple[dict[str, str], dict[str, float]]:
         """Forms and sizes of the best part of a set, and of the effect that it lacks."""
@@ -317,6 +323,15 @@ def _polish(found: Search, sets: Iterable[Set]) -> None:
 def flexible(identifier: str) -> tuple[str, ...]:
     """The forms that hold most shapes of an effect, one of every kind."""
     return tuple(f"{identifier}:{form}" for form in effect(identifier).bent_forms) or (identifier,)
+
+
+def flexible_like(form: str) -> str:
+    """The one of an effect's flexible forms that holds this form."""
+    identifier, _, name = form.partition(":")
+    kind = name.removesuffix(FORM).removesuffix("-")
+    return next(
+        (f for f in flexible(identifier) if f == f"{identifier}:{kind}-{FORM}"), flexible(identifier)[0]
+    )
 
 
 def forms_of(identifier: str) -> tuple[str, ...]:

@@ -13,8 +13,9 @@ Ints = NDArray[np.int64]
 
 AT_REST = 0.06
 """Up to this share of its stroke's largest speed the crosshead is at rest."""
-DEAD_STOP = 0.2
-"""Under way with at least this share of it on one side and at rest on the other: a dead stop."""
+DEAD_STOP, ABRUPT = 0.2, 0.5
+"""Under way with at least this share of it on one side and at rest on the other: a dead stop. So is any less
+where it was under way with the second share before: the motion ended in the step to the row."""
 
 
 def row_readings(loops: Loops) -> Readings:
@@ -99,7 +100,15 @@ def speeds(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array,
     before, after = np.maximum(rows - window, first[segment]), np.minimum(rows + window, last[segment])
     sides = np.stack([_between(loops, before, rows), _between(loops, rows, after)])
     inner = (before < rows) & (rows < after)
-    corner = inner & (sides.min(axis=0) <= AT_REST * fastest) & (sides.max(axis=0) >= DEAD_STOP * fastest)
+    beyond = np.stack(
+        [
+            _between(loops, np.maximum(before - window, first[segment]), before),
+            _between(loops, after, np.minimum(after + window, last[segment])),
+        ]
+    )
+    abrupt = np.take_along_axis(beyond, sides.argmax(axis=0)[None], axis=0)[0] >= ABRUPT * fastest
+    stopped = sides.max(axis=0) >= np.where(abrupt, AT_REST, DEAD_STOP) * fastest
+    corner = inner & (sides.min(axis=0) <= AT_REST * fastest) & stopped
     rest = (local <= AT_REST * fastest) | corner
     # Nor is it the mean of motion and rest next to one.
     changes = np.flatnonzero(np.diff(segment, prepend=-1) | np.diff(rest, prepend=rest[0]))

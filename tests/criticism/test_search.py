@@ -1,0 +1,49 @@
+"""The search: a pair looks at every kind of its causes, whatever kind each had taken alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from rig import case as rig_case
+from rig.effects import shared_form
+from rig.recipes import Recipe, Wanted, build_case
+
+from criticism.test_hypotheses import problem_of
+from mpam_calib.criticism.search import flexible, flexible_like, search
+from mpam_calib.specimen import read
+
+PAIR = frozenset({"order_too_low", "stress_softening"})
+
+
+def test_a_kind_is_looked_for_beside_the_partner(tmp_path: Path) -> None:
+    """A wall whose next order is missing, and softening of the whole force (not the wall's stress alone).
+
+    Alone, softening takes what the missing order leaves for a change of the wall's stress; with the partner
+    in its place only the true kind needs no bend.
+    """
+    wanted = [("order_too_low", 40.0), ("stress_softening", 8.0)]
+    effects = tuple(Wanted(i, shared_form(i).name, multiple, 1) for i, multiple in wanted)
+    recipe = Recipe(
+        "kinds", 0, "separable", "tensile", "thumb", "tensile", 5, 3, 2, 1500,
+        kinematics="constant_thickness", friction="none", effects=effects,
+    )  # fmt: skip
+    rig_case.write_case(build_case(recipe), tmp_path / "specimen", tmp_path / "truth.json")
+    found = search(problem_of(read(tmp_path / "specimen")), (*sorted(PAIR), "length_offset", "wall_pressure"))
+    assert found.sets[0] == PAIR
+    assert found.fits[PAIR, found.best_size(PAIR)].effects == {"order_too_low", "stress_softening:force"}
+
+
+@pytest.mark.parametrize(
+    ("form", "held_by"),
+    [
+        ("creep", "creep:bent"),
+        ("creep:wall", "creep:wall-bent"),
+        ("presliding:ramp-bent", "presliding:ramp-bent"),
+        ("dead_band:soft", "dead_band:bent"),
+        ("braid_angle:bent", "braid_angle:bent"),
+    ],
+)
+def test_flexible_forms_hold_the_others(form: str, held_by: str) -> None:
+    assert flexible_like(form) == held_by
+    assert held_by in flexible(form.partition(":")[0])
