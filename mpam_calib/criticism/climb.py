@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from mpam_calib.criticism.problem import Problem
-from mpam_calib.model.bend import BENDS
+from mpam_calib.model.bend import is_bend
 from mpam_calib.model.chain import Chain
 
 Array = NDArray[np.float64]
@@ -194,7 +194,7 @@ class Climb:
         self, u: Array, guide: Array, eta: Array, look: Callable[[Array, Array, Array], Place]
     ) -> Place:
         d = len(u)
-        bends = np.array([BENDS in name for name in self.names], dtype=bool)
+        bends = np.array([is_bend(name) for name in self.names], dtype=bool)
         furthest = np.where(bends, MOST_BENT, FURTHEST)
         released = not bends.any() or bool(np.any(u[bends] != 0.0))
         best: Place | None = None

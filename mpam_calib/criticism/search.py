@@ -21,7 +21,7 @@ from mpam_calib.criticism.doubt import DOUBTS
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
 from mpam_calib.criticism.spread import Alone, Spread, held_problem, spread_over
-from mpam_calib.model.bend import BENDS, FORM
+from mpam_calib.model.bend import FORM, is_bend
 from mpam_calib.model.effect import effect
 
 Array = NDArray[np.float64]
@@ -142,7 +142,7 @@ class Search:
         own = self._known(frozenset([new]), size)
         assert base is not None
         forms = _forms(base) | ({new: flexible(new)[0]} if own is None else _forms(own))
-        start = {} if own is None else {n: u for n, u in _ended(own).items() if BENDS not in n}
+        start = {} if own is None else {n: u for n, u in _ended(own).items() if not is_bend(n)}
         return forms, start | _ended(base)
 
     def _known(self, effects: Set, size: int) -> Fit | None:

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 FORM: Final = "bent"
 """The form's name: ``id:bent``."""
 BENDS: Final = "_bend_"
-"""What the names of its coefficients hold."""
+"""What the names of its coefficients hold, beside those of the effect's own parameters."""
 BEND: Final[Mapping[str, float]] = {"contraction": 0.25, "pressure": 0.25, "force": 0.4, "speed": 0.4}
 """Prior sd of the first bend: a size that differs by ±25 % between the two ends of its driver ..."""
 LOOSE: Final = 0.5
@@ -76,6 +76,11 @@ DRIVERS: Final[Mapping[str, Callable[[State, Setting], Array]]] = {
 
 POLYNOMIAL: Final = ("contraction", "time")
 """Drivers along which the factor is a polynomial and may vanish."""
+
+
+def is_bend(name: str) -> bool:
+    """Whether a parameter is such a coefficient; ``law_bend_1`` is a parameter of an effect, and is not."""
+    return BENDS in name.removeprefix("law_bend_")
 
 
 def bend_parameters(

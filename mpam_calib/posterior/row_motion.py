@@ -61,11 +61,38 @@ def history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Arr
     # At a speed of its own on either side the way after the turn is v'·t' with v·t + v'·t' travelled in all.
     share = speed_out / np.maximum(speed_in + speed_out, 1e-15)
     since_turn = np.where(turned, np.clip(share * (speed_in * gap + back), 0.0, 2.0 * way_out), way_out)
+    turns = loops.displacement_m[first] - direction * since_turn
+    since_turn = _since_the_start(loops, first, direction, turned, turns, since_turn, way_out)
     travel = since_turn[segment] + np.abs(loops.displacement_m - loops.displacement_m[first][segment])
     run = np.cumsum(~same_level) - 1
     level_start = loops.time_s[first][~same_level]
     at_level = loops.time_s - level_start[run][segment]
     return travel, (same_level & opposite).astype(np.float64), at_level
+
+
+def _since_the_start(
+    loops: Loops,
+    first: Ints,
+    direction: Array,
+    turned: NDArray[np.bool_],
+    turns: Array,
+    known: Array,
+    step: Array,
+) -> Array:
+    """The way ``known`` (strokes,) since each stroke's turn, put right for those that no turn began.
+
+    A level's first stroke begins where the later ones of its direction turn, if that is within a step of its
+    first reading: where in its step a recording begins is up to the rig.
+    """
+    result = known.copy()
+    for i in np.flatnonzero(~turned):
+        alike = turned & (direction == direction[i]) & (loops.level[first] == loops.level[first[i]])
+        alike &= loops.clock[first] == loops.clock[first[i]]
+        if alike.any():
+            way = float(direction[i] * (loops.displacement_m[first[i]] - np.median(turns[alike])))
+            if -0.5 * step[i] <= way <= 2.5 * step[i]:
+                result[i] = max(way, 0.0)
+    return result
 
 
 def _half_step(displacement: Array, end: Ints, inner: Ints, direction: Array) -> Array:

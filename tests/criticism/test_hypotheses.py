@@ -12,9 +12,10 @@ from rig import recipes, sets
 from scipy import stats
 
 from mpam_calib.criticism.candidates import candidates
-from mpam_calib.criticism.fit import fit
+from mpam_calib.criticism.fit import chain_for, fit
 from mpam_calib.criticism.gain import linearise
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
+from mpam_calib.model.bend import is_bend
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.effect import effect, known_effects
@@ -150,3 +151,23 @@ def test_a_fit_does_not_stay_where_the_force_has_another_sign() -> None:
     causes = frozenset({"coulomb_friction", "dead_band"})
     near = fit(fold, causes, 0, {"f_s": 0.45, "P_DB_kPa": 0.16, "K_f": -0.5})
     assert fit(fold, causes, 0).log_evidence == pytest.approx(near.log_evidence, abs=0.05)
+
+
+def test_a_law_far_from_the_declared_one_is_reached(null_problem: Problem) -> None:
+    """Its parameters are sizes, not bends of one: they go as far as any size."""
+    effects = frozenset({"law_shape"})
+    chain = chain_for(null_problem.blueprint.model_dump_json(), effects)
+    names = [p.name for p in chain.parameters]
+    assert [is_bend(n) for n in ("law_bend_1", "law_bend_1_bend_2", "offset_mm_bend_1")] == [
+        False,
+        True,
+        True,
+    ]
+    u, n = np.zeros(len(names)), len(null_problem)
+    first = next(i for i, name in enumerate(names) if name.startswith("law_bend"))
+    u[first] = 3.5
+    values = {p.name: p.prior.from_normal(np.full((1, 1), u[i])) for i, p in enumerate(chain.parameters)}
+    both = chain.force(values, np.zeros((1, chain.linear_size)), null_problem.readings)[0]
+    found = fit(null_problem.with_force(0.5 * (both[:n] + both[n:])), effects, 0)
+    assert found.u[first] == pytest.approx(3.5, abs=0.3)
+    assert found.chi2 < 0.05 * n, "what prior and bow leave"

@@ -131,6 +131,30 @@ def test_a_dead_stop_has_no_speed_between(phase):
     assert found.rest[found.position >= n] == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("late", [0.02, 0.3, 0.9])
+def test_a_level_s_first_stroke_begins_where_the_others_turn(late):
+    """Its first reading is ``late`` steps under way; only the later turns tell, to a hundredth of a step."""
+    n, cycles = 40, 3
+    step = STROKE / n
+    path = (np.arange(2 * n * cycles) + late) * step
+    away = STROKE - np.abs(np.mod(path, 2.0 * STROKE) - STROKE)
+    made = build.loops((150.0,), 12.0, n, cycles=cycles)
+    travel = row_readings(replace(made, displacement_m=away)).travel
+    assert travel[:n] == pytest.approx(path[:n], abs=0.01 * step)
+
+
+def test_a_first_stroke_from_elsewhere_is_taken_to_begin_half_a_step_before():
+    n = 40
+    step = STROKE / n
+    away = (np.arange(n) + 0.5) * step
+    other = STROKE - away
+    made = build.loops((150.0,), 12.0, n, cycles=2)
+    x = np.concatenate([away, other, away, other])
+    x[:n] = 0.5 * (x[:n] + STROKE)
+    travel = row_readings(replace(made, displacement_m=x)).travel
+    assert travel[0] == pytest.approx(0.25 * step, rel=0.05)
+
+
 def test_a_stroke_without_motion_keeps_its_bins():
     """Held at one length, as in an isometric test, time alone divides the rows."""
     made, _ = gentle(40, strokes=2)
