@@ -77,7 +77,7 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
     else:
         cycle = number_cycles(level, clock, branch)
     loops = Loops(
-        time_s=rows["time_s"].to_numpy(),
+        time_s=one_after_the_other([frame["time_s"].to_numpy() for frame in frames]),
         pressure_Pa=pressure,
         displacement_m=rows["displacement_mm"].to_numpy() * MM,
         force_N=rows["force_N"].to_numpy(),
@@ -92,6 +92,19 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
         temperature_C=rows["temperature_C"].to_numpy() if "temperature_C" in everywhere else None,
     )
     return LoopsRead(loops, levels_Pa, tuple(counts), tuple(notes))
+
+
+def one_after_the_other(times: Sequence[Floats]) -> Floats:
+    """The test's time, s: a file whose clock has begun anew follows the one before, as if without a pause.
+
+    What goes on over the whole test (a load cell's drift) goes on over its files.
+    """
+    found = [times[0]]
+    for time in times[1:]:
+        end = float(found[-1][-1])
+        step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+        found.append(time if time[0] > end else time - time[0] + end + step)
+    return np.concatenate(found)
 
 
 def _read_file(file: DataFile, averaged: int, floor_N: float | None) -> tuple[pd.DataFrame, int]:

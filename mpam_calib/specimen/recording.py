@@ -33,10 +33,10 @@ class Loops:
     """Force-displacement loops in time order; every array has shape (rows,).
 
     ``stroke`` numbers the contiguous runs of one file, level, cycle and branch, from 0; ``clock``
-    numbers the files, because each file has its own clock; ``averaged`` is how many consecutive
-    rows of a very large file each entry stands for (1 otherwise). ``unclear`` rows, at turns, tell of the
-    motion, but their force may belong to the other branch. ``temperature_C`` is there only where every
-    loops file has the column.
+    numbers the files, each of which may have its own clock: ``time_s`` goes on from file to file.
+    ``averaged`` is how many consecutive rows of a very large file each entry stands for (1 otherwise).
+    ``unclear`` rows, at turns, tell of the motion, but their force may belong to the other branch.
+    ``temperature_C`` is there only where every loops file has the column.
     """
 
     time_s: Floats

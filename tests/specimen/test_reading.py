@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mpam_calib.specimen import Specimen, read
+from mpam_calib.specimen.loops import one_after_the_other
 from mpam_calib.specimen.recording import Loops
 
 from .folders import DECLARATION, Recording, loops, make
@@ -86,6 +87,14 @@ def test_setpoints_only_group(tmp_path: Path) -> None:
     specimen = read(make(tmp_path, loops=text))
     assert specimen.levels_Pa == pytest.approx([50e3, 52e3])
     assert loops_of(specimen).level[0] == 0  # by its reading, not by its setpoint
+
+
+def test_time_goes_on_from_file_to_file() -> None:
+    """A clock that begins anew follows the file before; one that all files share is left as it is."""
+    first, again, shared = np.arange(4.0), 7.0 + 0.5 * np.arange(3), 50.0 + np.arange(2)
+    found = one_after_the_other([first, again - 7.0, shared])
+    assert found.tolist() == [0.0, 1.0, 2.0, 3.0, 3.5, 4.0, 4.5, 50.0, 51.0]
+    assert one_after_the_other([first]).tolist() == first.tolist()
 
 
 def test_one_file_for_each_pressure_with_its_own_clock(tmp_path: Path) -> None:
