@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -66,6 +67,13 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
             f"loops: {int(unclear.sum())} readings at turns and beside holds are left out: their "
             "displacement does not tell the branch (a column branch would)"
         )
+    times = [frame["time_s"].to_numpy() for frame in frames]
+    anew = sum(bool(after[0] <= before[-1]) for before, after in pairwise(times))
+    if anew:
+        notes.append(
+            f"loops: the clock begins anew in {anew} of {len(frames)} files; they count as recorded in the "
+            "order given, without a pause (a drift goes on from file to file)"
+        )
     rows = pd.concat([frame[sorted(everywhere)] for frame in frames], ignore_index=True)
     pressure = rows["pressure_kPa"].to_numpy() * KPA
     level, levels_Pa = _sorted_levels(pressure, level)
@@ -77,7 +85,7 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
     else:
         cycle = number_cycles(level, clock, branch)
     loops = Loops(
-        time_s=one_after_the_other([frame["time_s"].to_numpy() for frame in frames]),
+        time_s=one_after_the_other(times),
         pressure_Pa=pressure,
         displacement_m=rows["displacement_mm"].to_numpy() * MM,
         force_N=rows["force_N"].to_numpy(),

@@ -107,6 +107,8 @@ def test_one_file_for_each_pressure_with_its_own_clock(tmp_path: Path) -> None:
     assert found.level[found.clock == 0].tolist() == [1] * len(b.time)
     assert set(found.cycle[found.clock == 1]) == {1} and set(found.cycle[found.clock == 2]) == {2}
     assert [file.name for file in specimen.files] == ["b.csv", "a.csv", "c.csv"]
+    assert np.all(np.diff(found.time_s) > 0.0)
+    assert any("begins anew in 2 of 3 files" in note for note in specimen.notes)
 
 
 def test_given_branches_and_cycles_are_kept(tmp_path: Path) -> None:
