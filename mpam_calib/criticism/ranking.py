@@ -184,11 +184,11 @@ def _climbs(
     known: Array | None = None
     for size in reversed(range(len(SIZES))):
         start = _at(found.get(size + 1))
-        if size in targets:
-            if known is None or worth < np.inf:
-                known = find_rates(targets[size], known, worth, seed)
-            start = targets[size].start(known[0])
         try:
+            if size in targets:
+                if known is None or worth < np.inf:
+                    known = find_rates(targets[size], known, worth, seed)
+                start = targets[size].start(known[0])
             new = fit(problem, frozenset(), size, start, blueprint)
         except np.linalg.LinAlgError:
             continue
