@@ -12,7 +12,7 @@ from criticism.own_rates import made_with_rates_of_its_own
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism import ranking
 from mpam_calib.criticism.climb import Climb
-from mpam_calib.criticism.fit import Fit, chain_for, fit
+from mpam_calib.criticism.fit import chain_for, fit
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.rates import Rates, find_rates
 from mpam_calib.criticism.spread import Alone
@@ -144,12 +144,3 @@ def test_only_models_near_the_top_are_searched_again(own: Problem, off: float, a
     first = replace(free, log_evidence=top)
     _, found = ranking._searched_again(Alone(own), [first, bad])
     assert found.log_evidence == pytest.approx((right if again else bad).log_evidence, abs=0.5)
-
-
-def test_fits_come_from_one_size_each(problem: Problem) -> None:
-    simulation = plain(problem, "exponential_each", "coulomb", 2).simulation
-    found = ranking.fitted(problem, simulation)
-    assert found is not None
-    sizes = [f.size for f in found.fits]
-    assert sizes == sorted(set(sizes))
-    assert all(isinstance(f, Fit) and f.names[-4:] == ("d_1", "gap_1", "d_2", "gap_2") for f in found.fits)
