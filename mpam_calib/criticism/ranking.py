@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from mpam_calib.criticism.evidence import log_evidence_by_quadrature
+from mpam_calib.criticism.evidence import SETTLES, log_evidence_by_quadrature
 from mpam_calib.criticism.fit import Fit, chain_for, fit
 from mpam_calib.criticism.noise_scale import settle_noise
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
@@ -26,14 +26,15 @@ from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.moduli import rate_names
 from mpam_calib.specimen.declaration import Simulation
 
-NEAR = 10.0
-"""Nats below the best within which Laplace's evidence is replaced by quadrature."""
+NEAR, LEADING = 50.0, 20.0
+"""Nats below the best within which quadrature replaces Laplace's evidence; and, where a model has too many
+parameters for that, the mode and curvature of its own density do."""
 PROMISING = 60.0
 """Nats below the best model so far within which a law's rates are searched for all their modes."""
-CLOSE, AGAIN = 50.0, 4
-"""Nats below the best within which rates of each modulus's own are searched again, so many times."""
-ROUGH = 10.0
-"""Nats by which the fits' evidence may be off where each modulus has rates of its own."""
+AGAIN = 4
+"""Times that rates of each modulus's own are searched again where the model is near the best."""
+SMOOTHED = 100.0
+"""Nats by which free moduli may like another remainder better, where rates are searched for all modes."""
 SILENT = 300.0
 """Nats below a larger remainder at which still smaller ones are not tried."""
 CHANCE = 3.0
@@ -100,11 +101,11 @@ def rank_spread(
         ranked += rated
         tell("ranking", 0.5 + (number + 1) / len(tasks) / 2)
     ranked = _searched_again(spread, ranked)
-    near = max(r.log_evidence for r in ranked) - NEAR
+    top = max(r.log_evidence for r in ranked)
     wanted = [
         i
         for i, r in enumerate(ranked)
-        if r.log_evidence >= near - (ROUGH if r.simulation.law == EACH else 0.0) or always(r.simulation)
+        if r.log_evidence >= top - (NEAR if len(r.best.u) <= SETTLES else LEADING) or always(r.simulation)
     ]
     for number, (i, better) in enumerate(
         zip(wanted, spread(integrated, [ranked[i] for i in wanted]), strict=True)
@@ -119,7 +120,7 @@ def _searched_again(spread: Spread, ranked: list[Ranked]) -> list[Ranked]:
 
     Their modes are too many for any one search to find the best.
     """
-    close = max(r.log_evidence for r in ranked) - CLOSE
+    close = max(r.log_evidence for r in ranked) - NEAR
     wanted = [i for i, r in enumerate(ranked) if r.simulation.law == EACH and r.log_evidence >= close]
     free = {s.simulation.model_dump_json(): s for s in ranked if s.simulation.law == FREE}
     like = [ranked[i].simulation.model_copy(update={"law": FREE}).model_dump_json() for i in wanted]
@@ -180,14 +181,16 @@ def _climbs(
     """
     blueprint = blueprint_of(problem, simulation)
     targets = _rates_by_size(problem, simulation, free)
+    telling = max((t.fit.log_evidence for t in targets.values()), default=0.0) - SMOOTHED
     found: dict[int, Fit] = {}
     known: Array | None = None
     for size in reversed(range(len(SIZES))):
         start = _at(found.get(size + 1))
         try:
             if size in targets:
-                if known is None or worth < np.inf:
-                    known = find_rates(targets[size], known, worth, seed)
+                wanted = worth if targets[size].fit.log_evidence >= telling else np.inf
+                if known is None or wanted < np.inf:
+                    known = find_rates(targets[size], known, wanted, seed)
                 start = targets[size].start(known[0])
             new = fit(problem, frozenset(), size, start, blueprint)
         except np.linalg.LinAlgError:
@@ -277,4 +280,4 @@ def _hopeful(plain: dict[str, Ranked | None], top: float) -> bool:
     free = plain.get(FREE)
     if free is None:
         return True
-    return free.ceiling >= top - NEAR
+    return free.ceiling >= top - LEADING

@@ -17,6 +17,7 @@ LAWS = {"constant": 1, "linear": 2, "free": 2, "exponential": 3, "exponential_ea
 def model_space(specimen: Specimen) -> list[Simulation]:
     """Every such simulation; the declared effects and the moduli's source are kept.
 
+    A single modulus has the same exponential law whether rates are shared or not: it is there once.
     Laws vary fastest and in the order of LAWS (:mod:`mpam_calib.criticism.ranking` relies on neither).
     """
     declared = specimen.simulation
@@ -30,10 +31,12 @@ def model_space(specimen: Specimen) -> list[Simulation]:
     if declared.moduli != "loops":
         orders, laws, strains = [declared.order], ["constant"], [declared.strain]
     kinematics = ["inextensible_braid", "constant_thickness"]
+    twice = "exponential" if (declared.law, declared.order) == ("exponential_each", 1) else "exponential_each"
     return [
         declared.model_copy(
             update={"kinematics": k, "strain": s, "order": m, "friction": f, "law": w}
             | ({"friction_by_pressure": False} if f != declared.friction else {})
         )
         for k, s, m, f, w in product(kinematics, strains, orders, frictions, laws)
+        if (w, m) != (twice, 1)
     ]

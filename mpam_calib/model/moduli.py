@@ -167,7 +167,7 @@ class ModuliBlock:
 
     def _newton_transform(self, values: Values) -> Array:
         assert self.grid is not None
-        levels, columns = self.grid
+        levels, columns = self.grid[0], self._grid_shape
         index = np.arange(len(levels)) if self.law.name == "free" else np.full(len(levels), -1)
         h = self.law.basis(levels, index, values)
         # Columns of the whole grid in the block's order (term major, modulus minor).
@@ -177,7 +177,7 @@ class ModuliBlock:
         norm[norm == 0.0] = 1.0
         R = np.asarray(np.linalg.qr(full / norm, mode="r"))
         p = full.shape[2]
-        points = full.shape[1]
+        points = len(levels) * len(self.grid[1])
         alike = np.any(np.abs(np.diagonal(R, axis1=1, axis2=2)) < ALIKE, axis=1)
         R[alike] = np.eye(p)
         inverse = np.linalg.solve(R, np.broadcast_to(np.eye(p), R.shape))
@@ -185,6 +185,14 @@ class ModuliBlock:
             inverse[alike] = _orthogonal((full / norm)[alike])
         result: Array = self.scale * np.sqrt(points / p) * inverse / np.swapaxes(norm, 1, 2)
         return result
+
+    @property
+    def _grid_shape(self) -> Array:
+        """Rows (≤ order, order) with the lengths and angles of the grid's contraction columns."""
+        assert self.grid is not None
+        if "grid" not in self._cache:
+            self._cache["grid"] = np.asarray(np.linalg.qr(self.grid[1], mode="r"))
+        return self._cache["grid"]
 
     def columns(
         self, pressure: Array, level: Ints, per_modulus: Array, values: Values

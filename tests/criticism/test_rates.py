@@ -125,7 +125,7 @@ def test_a_thorough_search_is_not_beaten_by_many_more_climbs(problem: Problem) -
     assert found >= quick
 
 
-@pytest.mark.parametrize(("off", "again"), [(5.0, True), (2.0 * ranking.CLOSE, False)])
+@pytest.mark.parametrize(("off", "again"), [(5.0, True), (2.0 * ranking.NEAR, False)])
 def test_only_models_near_the_top_are_searched_again(own: Problem, off: float, again: bool) -> None:
     """A first search that ended badly does not decide the ranking."""
     laws = ("free", "exponential_each")
