@@ -83,7 +83,10 @@ class Processes:
     def map(self, work: Callable[[Task], Found], tasks: Iterable[Task]) -> list[Found]:
         """All tasks at once; raises ``Interrupted`` where a process is killed."""
         try:
-            return list(self.executor.map(work, tasks))
+            # Not the executor's own map: when interrupted it cancels what waits, and a future cancelled
+            # while a worker is killed ends the executor's thread with a traceback.
+            waiting = [self.executor.submit(work, task) for task in tasks]
+            return [each.result() for each in waiting]
         except BrokenProcessPool as error:
             raise Interrupted(
                 "interrupted: a worker process was killed (for want of memory?); what was drawn is kept, the "

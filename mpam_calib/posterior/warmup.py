@@ -1,12 +1,12 @@
 """Warm-up: fit the independence proposal to the posterior before the draws that count.
 
 Laplace's covariance at the modes starts it; weighted draws from it refit it (adaptive importance
-sampling), with a few components for a posterior that is askew. Where enough of them carry weight, one round
-of the ensembles lets their over-dispersed starts settle. Where not, the posterior is bent, and what a mixture
-misses of a bent tail its own draws cannot show: there the walkers explore by moves that need no mixture,
-climbing again from any that found a better place. Many small components then follow what they met, and are
-refitted by weighted draws that look beyond it. Where these carry weight, they are the greater part of the
-moves; else a mixture of a few stays the smaller one.
+sampling), with a few components for a posterior that is askew. Where enough of them carry weight, and none
+far more than the others, one round of the ensembles lets their over-dispersed starts settle. Where not, the
+posterior is bent, and what a mixture misses of a bent tail its own draws cannot show: there the walkers
+explore by moves that need no mixture, climbing again from any that found a better place. Many small
+components then follow what they met, and are refitted by weighted draws that look beyond it. Where these
+carry weight, they are the greater part of the moves; else a mixture of a few stays the smaller one.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.ensembles import Block, EnsembleState, Moves
@@ -31,6 +32,9 @@ RELEVANT = 8.0
 WEIGHTED_ROUNDS, WEIGHTED_DRAWS = 4, 1000
 GOOD_SHARE = 0.7
 """Effective share of weighted draws at which the proposal is good."""
+CHECKED, TAIL, FAR_MORE, LIGHT = 3000, 164, 3.0, 0.5
+"""Draws that look for a tail which the proposal misses, and the heaviest 3√n of n; the multiple of the mean
+weight from which on they are judged; the largest shape k̂ at which the variance of weights is finite."""
 INDEPENDENT, SHARED, EXPLORING = 0.9, 0.4, 0.1
 """Share of steps that propose from a good mixture, from another one, and while walkers explore."""
 COMPONENTS, MORE_COMPONENTS = 3, 6
@@ -121,6 +125,20 @@ def _weigh(modes: list[Mode], evaluate: Evaluate, seed: int) -> tuple[StudentMix
     return best, shares
 
 
+def heaviness(mixture: StudentMixture, evaluate: Evaluate, seed: int) -> float:
+    """Shape k̂ of the Pareto tail of the posterior's weights (Vehtari and others 2024, JMLR 25(72)).
+
+    A bent tail hides from the effective share of some hundred draws, as few of them are there. Zero where no
+    draw weighs far more than the others.
+    """
+    x = mixture.draw(CHECKED, np.random.RandomState([seed, 1]))
+    log_weight = np.sort(evaluate(x) - mixture.log_density(x))
+    weight = np.exp(log_weight - log_weight[-1])
+    if weight.mean() > 1.0 / FAR_MORE:
+        return 0.0
+    return float(stats.genpareto.fit(weight[-TAIL:] - weight[-TAIL - 1], floc=0.0)[0])
+
+
 def _climb_again(target: Collapsed, blocks: list[Block], modes: list[Mode]) -> list[Mode]:
     """The modes, with the one that the best walker leads to where it beats them all."""
     best = max(blocks, key=lambda b: float(b.log_prob[-1].max()))
@@ -145,7 +163,7 @@ def warm_up(
     """
     mixture, accepted = _weigh(modes, evaluate, seed)
     states = starts(mixture)
-    if accepted[-1] >= GOOD_SHARE:
+    if accepted[-1] >= GOOD_SHARE and heaviness(mixture, evaluate, seed) <= LIGHT:
         blocks = run(states, Moves(mixture, INDEPENDENT), STEPS)
         accepted.append(_accepted(blocks))
         # Walkers that hardly moved are still their wide starts.

@@ -4,34 +4,60 @@ from __future__ import annotations
 
 import emcee
 import numpy as np
+import pytest
 from model import build
+from scipy import stats
 
 from mpam_calib.posterior.mode import evaluate
+from mpam_calib.posterior.proposal import StudentMixture
 from mpam_calib.posterior.sampling import sample
 from mpam_calib.posterior.target import build_target, locate
+from mpam_calib.posterior.warmup import LIGHT, heaviness
 
 from . import sbc
 
-SEED, WALKERS, STEPS = 47, 96, 1200
-"""Two rates that three levels hardly tell apart: their ridge is a hundred times as long as wide, and bent."""
+WALKERS, STEPS = 96, 4000
 
 
-def test_the_tail_of_a_ridge_is_drawn() -> None:
-    """The share of the posterior beyond the truth, a tenth; a mixture alone finds some thousandths of it."""
-    rng = np.random.default_rng([SEED, 99])
+@pytest.mark.parametrize("seed", [47, 63])
+def test_the_tail_of_a_ridge_is_drawn(seed: int) -> None:
+    """The tenth of the posterior at the ridge's far end; a mixture alone finds some thousandths of it, and
+    where it seems to fit (the second seed), half.
+
+    Two rates that three levels hardly tell apart: their ridge is a hundred times as long as wide, and bent.
+    """
+    rng = np.random.default_rng([seed, 99])
     made, blueprint = sbc.design({"law": "exponential", "order": 2}, build.PLAIN)
-    truth, _, made = sbc.simulate(made, blueprint, rng)
-    target, modes = locate(build_target(made, blueprint), np.random.default_rng([SEED, 0]))
+    *_, made = sbc.simulate(made, blueprint, rng)
+    target, modes = locate(build_target(made, blueprint), np.random.default_rng([seed, 0]))
     gap = target.model.names.index("gap")
     spread = np.sqrt(np.diag(modes[0].covariance))
     starts = modes[0].u + spread * rng.standard_normal((WALKERS, len(spread)))
     plain = emcee.EnsembleSampler(WALKERS, len(spread), lambda u: evaluate(target, u), vectorize=True)
-    plain.random_state = np.random.RandomState(SEED).get_state()
+    plain.random_state = np.random.RandomState(seed).get_state()
     plain.run_mcmc(starts, STEPS)
-    beyond = float(np.mean(plain.get_chain(discard=STEPS // 3)[..., gap] < truth[0, gap]))
-    assert 0.05 < beyond < 0.2
-    drawn = sample(target, modes, SEED, max_steps=800)
+    end = np.quantile(plain.get_chain(discard=STEPS // 3)[..., gap], 0.1)
+    drawn = sample(target, modes, seed, max_steps=800)
     assert drawn.converged
-    shares = np.mean(drawn.chain[..., gap] < truth[0, gap], axis=(1, 2))
-    assert abs(shares.mean() - beyond) < 0.3 * beyond
+    shares = np.mean(drawn.chain[..., gap] < end, axis=(1, 2))
+    # Steps that remember some 200 others: the stretch move's own tenth is known to a sixth of it.
+    assert abs(shares.mean() - 0.1) < 0.03
     assert shares.max() < 2.0 * shares.min()
+
+
+def test_a_tail_that_a_proposal_misses_is_seen_and_none_where_none_is() -> None:
+    """A tenth of the mass far outside a normal proposal; a proposal too wide, or the posterior itself."""
+    proposal = StudentMixture.build([np.zeros(3)], [np.eye(3)])
+    far = np.array([4.0, 0.0, 0.0])
+
+    def missed(x: np.ndarray) -> np.ndarray:
+        both = [stats.multivariate_normal.logpdf(x, mean) for mean in (np.zeros(3), far)]
+        return np.asarray(np.logaddexp(both[0] + np.log(0.9), both[1] + np.log(0.1)))
+
+    def narrow(x: np.ndarray) -> np.ndarray:
+        return np.asarray(stats.multivariate_normal.logpdf(x, np.zeros(3), 0.8))
+
+    for seed in range(5):
+        assert heaviness(proposal, missed, seed) > LIGHT
+        assert heaviness(proposal, narrow, seed) < LIGHT
+        assert heaviness(proposal, proposal.log_density, seed) < LIGHT

@@ -31,8 +31,8 @@ def test_the_band_holds_what_it_promises():
     assert sbc.outside(names, (draws < truth).sum(axis=2))
 
 
-def test_ranks_of_truth_are_uniform_in_forty_replicates():
-    names, ranks, narrowed = sbc.run(*MODELS["linear law, Coulomb"][:2], 40)
+def test_ranks_of_truth_are_uniform_in_eighty_replicates():
+    names, ranks, narrowed = sbc.run(*MODELS["linear law, Coulomb"][:2], 80)
     assert len(names) == 10
     assert sbc.outside(names, ranks) == {}
     assert "joint distance" in sbc.outside(names, narrowed)
