@@ -27,8 +27,8 @@ from mpam_calib.model.moduli import rate_names
 from mpam_calib.specimen.declaration import Simulation
 
 NEAR, LEADING = 50.0, 20.0
-"""Nats below the best within which quadrature replaces Laplace's evidence; and, where a model has too many
-parameters for that, the mode and curvature of its own density do."""
+"""Nats below the best within which quadrature replaces Laplace's evidence; and the same for SETTLES parameters
+(bent ones take a minute), and for more, where the mode and curvature of the model's own density do."""
 PROMISING = 60.0
 """Nats below the best model so far within which a law's rates are searched for all their modes."""
 AGAIN = 4
@@ -105,7 +105,7 @@ def rank_spread(
     wanted = [
         i
         for i, r in enumerate(ranked)
-        if r.log_evidence >= top - (NEAR if len(r.best.u) <= SETTLES else LEADING) or always(r.simulation)
+        if r.log_evidence >= top - (NEAR if len(r.best.u) < SETTLES else LEADING) or always(r.simulation)
     ]
     for number, (i, better) in enumerate(
         zip(wanted, spread(integrated, [ranked[i] for i in wanted]), strict=True)
