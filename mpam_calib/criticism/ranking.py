@@ -27,8 +27,8 @@ from mpam_calib.model.moduli import rate_names
 from mpam_calib.specimen.declaration import Simulation
 
 NEAR, LEADING = 50.0, 20.0
-"""Nats below the best within which quadrature replaces Laplace's evidence; and the same for SETTLES parameters
-(bent ones take a minute), and for more, where the mode and curvature of the model's own density do."""
+"""Nats below the best within which quadrature replaces Laplace's evidence; and within which it does so for
+SETTLES parameters (bent ones take a minute), and the mode and curvature of the density itself for more."""
 PROMISING = 60.0
 """Nats below the best model so far within which a law's rates are searched for all their modes."""
 AGAIN = 4
