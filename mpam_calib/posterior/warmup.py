@@ -2,11 +2,12 @@
 
 Laplace's covariance at the modes starts it; weighted draws from it refit it (adaptive importance
 sampling), with a few components for a posterior that is askew. Where enough of them carry weight, and none
-far more than the others, one round of the ensembles lets their over-dispersed starts settle. Where not, the
-posterior is bent, and what a mixture misses of a bent tail its own draws cannot show: there the walkers
+far more than the others, one round of the ensembles lets their over-dispersed starts settle. Where few do,
+the posterior is bent, and what a mixture misses of a bent tail its own draws cannot show: there the walkers
 explore by moves that need no mixture, climbing again from any that found a better place. Many small
-components then follow what they met, and are refitted by weighted draws that look beyond it. Where these
-carry weight, they are the greater part of the moves; else a mixture of a few stays the smaller one.
+components then follow what the walkers met (or the draws of which some weigh far too much), and are refitted
+by weighted draws that look beyond it. Where these carry weight, they are the greater part of the moves; else
+a mixture of a few stays the smaller one.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special, stats
 
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.ensembles import Block, EnsembleState, Moves
-from mpam_calib.posterior.local import follow
+from mpam_calib.posterior.local import effective_share, follow
 from mpam_calib.posterior.mode import Mode, climb, curvature
 from mpam_calib.posterior.proposal import CLOSE_FREEDOM, FREEDOM, StudentMixture, fit_normals
 
@@ -32,9 +33,9 @@ RELEVANT = 8.0
 WEIGHTED_ROUNDS, WEIGHTED_DRAWS = 4, 1000
 GOOD_SHARE = 0.7
 """Effective share of weighted draws at which the proposal is good."""
-CHECKED, TAIL, FAR_MORE, LIGHT = 3000, 164, 3.0, 0.5
-"""Draws that look for a tail which the proposal misses, and the heaviest 3√n of n; the multiple of the mean
-weight from which on they are judged; the largest shape k̂ at which the variance of weights is finite."""
+CHECKED, FAR_MORE, LIGHT = 3000, 3.0, 0.5
+"""Draws that look for a tail which the proposal misses; the multiple of the mean weight from which on one is
+judged; the largest shape k̂ of a tail at which the variance of weights is finite."""
 INDEPENDENT, SHARED, EXPLORING = 0.9, 0.4, 0.1
 """Share of steps that propose from a good mixture, from another one, and while walkers explore."""
 COMPONENTS, MORE_COMPONENTS = 3, 6
@@ -125,18 +126,17 @@ def _weigh(modes: list[Mode], evaluate: Evaluate, seed: int) -> tuple[StudentMix
     return best, shares
 
 
-def heaviness(mixture: StudentMixture, evaluate: Evaluate, seed: int) -> float:
-    """Shape k̂ of the Pareto tail of the posterior's weights (Vehtari and others 2024, JMLR 25(72)).
+def heaviness(log_weight: Array) -> float:
+    """Shape k̂ of the Pareto tail of weights (Vehtari and others 2024, JMLR 25(72)).
 
     A bent tail hides from the effective share of some hundred draws, as few of them are there. Zero where no
     draw weighs far more than the others.
     """
-    x = mixture.draw(CHECKED, np.random.RandomState([seed, 1]))
-    log_weight = np.sort(evaluate(x) - mixture.log_density(x))
-    weight = np.exp(log_weight - log_weight[-1])
+    tail = int(3.0 * np.sqrt(len(log_weight)))
+    weight = np.exp(np.sort(log_weight) - log_weight.max())
     if weight.mean() > 1.0 / FAR_MORE:
         return 0.0
-    return float(stats.genpareto.fit(weight[-TAIL:] - weight[-TAIL - 1], floc=0.0)[0])
+    return float(stats.genpareto.fit(weight[-tail:] - weight[-tail - 1], floc=0.0)[0])
 
 
 def _climb_again(target: Collapsed, blocks: list[Block], modes: list[Mode]) -> list[Mode]:
@@ -163,31 +163,44 @@ def warm_up(
     """
     mixture, accepted = _weigh(modes, evaluate, seed)
     states = starts(mixture)
-    if accepted[-1] >= GOOD_SHARE and heaviness(mixture, evaluate, seed) <= LIGHT:
-        blocks = run(states, Moves(mixture, INDEPENDENT), STEPS)
-        accepted.append(_accepted(blocks))
-        # Walkers that hardly moved are still their wide starts.
-        if accepted[-1] >= ENOUGH:
-            mixture = _with_walkers(modes, blocks)
-        return WarmUp([block.state for block in blocks], Moves(mixture, INDEPENDENT), modes, accepted, True)
-    for number in range(ROUNDS):
-        blocks = run(states, Moves(mixture, EXPLORING), EXPLORED)
-        states = [block.state for block in blocks]
-        accepted.append(_accepted(blocks))
-        # The first round still carries the wide starts.
-        if number > 0:
-            modes = _climb_again(target, blocks, modes)
-            mixture = _with_walkers(modes, blocks, MORE_COMPONENTS)
-    x = _drawn(blocks)
-    alike = np.full(len(x), 1.0 / len(x))
-    local = follow(evaluate, x, alike, LOCAL_ROUNDS, LOCAL_DRAWS, np.random.RandomState(seed))
+    enough = accepted[-1] >= GOOD_SHARE
+    if enough:
+        x = mixture.draw(CHECKED, np.random.RandomState([seed, 1]))
+        log_weight = evaluate(x) - mixture.log_density(x)
+        if heaviness(log_weight) <= LIGHT:
+            return _settled(mixture, states, modes, accepted, run)
+        weight = special.softmax(log_weight)
+        enough = effective_share(log_weight) >= FOLLOWS
+    if not enough:
+        for number in range(ROUNDS):
+            blocks = run(states, Moves(mixture, EXPLORING), EXPLORED)
+            states = [block.state for block in blocks]
+            accepted.append(_accepted(blocks))
+            # The first round still carries the wide starts.
+            if number > 0:
+                modes = _climb_again(target, blocks, modes)
+                mixture = _with_walkers(modes, blocks, MORE_COMPONENTS)
+        x = _drawn(blocks)
+        weight = np.full(len(x), 1.0 / len(x))
+    local = follow(evaluate, x, weight, LOCAL_ROUNDS, LOCAL_DRAWS, np.random.RandomState(seed))
     accepted.append(local.share)
-    if local.share < FOLLOWS:
-        return WarmUp(states, Moves(mixture, SHARED), modes, accepted, False)
-    moves = Moves(local.mixture, LOCAL_SHARE)
+    moves = Moves(mixture, SHARED) if local.share < FOLLOWS else Moves(local.mixture, LOCAL_SHARE)
     blocks = run(states, moves, STEPS)
     accepted.append(_accepted(blocks))
     return WarmUp([block.state for block in blocks], moves, modes, accepted, False)
+
+
+def _settled(
+    mixture: StudentMixture, states: list[EnsembleState], modes: list[Mode], shares: list[float], run: Run
+) -> WarmUp:
+    """The states after a round by a proposal that fits, and the proposal that fits what they drew."""
+    blocks = run(states, Moves(mixture, INDEPENDENT), STEPS)
+    accepted = _accepted(blocks)
+    # Walkers that hardly moved are still their wide starts.
+    if accepted >= ENOUGH:
+        mixture = _with_walkers(modes, blocks)
+    moves = Moves(mixture, INDEPENDENT)
+    return WarmUp([block.state for block in blocks], moves, modes, [*shares, accepted], True)
 
 
 def _accepted(blocks: list[Block]) -> float:
