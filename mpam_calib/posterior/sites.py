@@ -27,8 +27,8 @@ LEAST = 0.02
 """Smallest curvature of a site: a fiftieth of a Gaussian row's."""
 LEAST_SHARE = 0.3
 """Smallest share of the positive curvatures that the negative ones may leave."""
-COMPARABLE = 1e10
-"""Squares of this size are known to a millionth of a nat."""
+COMPARABLE = 1e13
+"""A sum of squares of this size is known to a hundredth of a nat."""
 NEIGHBOURS = 41
 """Chunks of about the same force, among which one is judged."""
 RARE = 1e-5
@@ -84,16 +84,16 @@ class FreeRows(NamedTuple):
     def correction(self, eta: Array, dof: Array) -> Array:
         """Σ ln t_ν(z) − ln N(z; shift, spread), (B,), for degrees of freedom (B,).
 
-        −∞ where rounding would decide: what is taken away stands in the Gaussian system's own density, and
-        at a scale far below every residual both are squares that leave nothing of each other.
+        −∞ where rounding would decide: at a scale far below every residual the Gaussian system's own density
+        is what two huge squares, before and after its coordinates take their part, leave of each other.
         """
         z, v = self.noise(eta), dof[:, None]
         peak = special.gammaln((v + 1.0) / 2.0) - special.gammaln(v / 2.0) - 0.5 * np.log(np.pi * v)
         free = peak - 0.5 * (v + 1.0) * np.log1p(z**2 / v)
         spread, shift = self.sites
-        squares = (z - shift) ** 2 / spread
-        site = -0.5 * (squares + np.log(spread) + LOG_2PI)
-        return np.where(squares.sum(axis=1) < COMPARABLE, np.sum(free - site, axis=1), -np.inf)
+        site = -0.5 * ((z - shift) ** 2 / spread + np.log(spread) + LOG_2PI)
+        before = np.sum(spread * (self.scale * self.residual) ** 2, axis=1)
+        return np.where(before < COMPARABLE, np.sum(free - site, axis=1), -np.inf)
 
 
 def usual_chunks(chunks: Array, force: Array) -> NDArray[np.bool_]:

@@ -123,6 +123,16 @@ def blocked(outlier: float, seed: int) -> Specimen:
     return replace(made, blocked_force=BlockedForce(pressure, force, zeros))
 
 
+def test_no_noise_at_all_is_no_mode():
+    """There squares of 1e20 and more leave rounding of each other, which may be millions of nats."""
+    made = blocked(50.0, 2)
+    target, modes = locate(build_target(made, draw_blueprint(made, build.PLAIN)), np.random.default_rng(0))
+    for freedom in (-30.0, -17.0, 0.0, 3.0):
+        values = target.model.values(np.array([modes[0].u, [-30.0, freedom]]))
+        assert values[WHITE][0, 0] > 0.1 and values[WHITE][1, 0] < 1e-8
+        assert np.isfinite(target.log_likelihood(values)).tolist() == [True, False]
+
+
 @pytest.mark.parametrize(("outlier", "allowed"), [(0.0, 0.01), (5.0, 0.1), (50.0, 0.1)])
 def test_against_quadrature_over_the_linear_coordinate(outlier, allowed):
     """∫ Π t_ν(y − f − A η) N(η) dη on a grid: differences of ln p across the posterior, mean and sd of η.
