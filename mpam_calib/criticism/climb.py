@@ -50,18 +50,21 @@ COARSE = 0.01
 class Place:
     """The force linearised at coordinates ``u`` (d,), with the linear ones ``eta`` (q,) at their optimum.
 
-    ``residual`` (n,) and ``J`` (n, d + q) are whitened, ``force`` (n,) is the model's in newtons,
-    ``guide`` (m,) the same at the lean readings, where ``turned`` says whether the muscle pulls other than it
-    was taken to; ``objective`` is the log density up to a constant.
+    ``residual`` (n,) and ``columns`` (n, q) are whitened, ``moved`` (n, d) is what a STEP of each size makes
+    of the ``force`` (n,), N; ``guide`` (m,) is the force at the lean readings, where ``taken`` and ``pulls``
+    are the signs of the muscle's own pull as it was taken and as it came out; ``objective`` is the log
+    density up to a constant.
     """
 
     u: Array
     eta: Array
     residual: Array
-    J: Array
+    columns: Array
+    moved: Array
     force: Array
     guide: Array
-    turned: bool
+    taken: Array
+    pulls: Array
     objective: float
 
 
@@ -128,18 +131,23 @@ class Climb:
         force = guide + (fixed + slope * (columns @ best[:p]) - guide) * factor
         force = np.broadcast_to(force, (len(points), len(readings)))[: len(u) + 1]
         whole = rows(force) + problem.bow
-        moved = whole[1:] - whole[0]
         objective = -0.5 * float(residual @ residual + u @ u + best @ best)
         return Place(
             u=u,
             eta=best,
             residual=residual,
-            J=np.concatenate([problem.white(moved.T / STEP, self.size), X], axis=1),
+            columns=X,
+            moved=(whole[1:] - whole[0]).T,
             force=whole[0],
             guide=force[0],
-            turned=not np.array_equal(np.sign(force[0] - beside[0]), np.sign(guide - beside[0])),
+            taken=np.sign(guide - beside[0]),
+            pulls=np.sign(force[0] - beside[0]),
             objective=objective if np.isfinite(objective) else -np.inf,
         )
+
+    def slopes(self, place: Place) -> Array:
+        """Whitened changes of the force with all coordinates, (n, d + q)."""
+        return np.concatenate([self.problem.white(place.moved / STEP, self.size), place.columns], axis=1)
 
     @cached_property
     def _still(self) -> float:
@@ -151,11 +159,13 @@ class Climb:
 
         A place that looked better with the signs of another one would never be left again.
         """
-        for _round in range(SIGN_ROUNDS):
-            place = self.look(u, guide, eta)
-            if not place.turned:
+        first = place = self.look(u, guide, eta)
+        for _round in range(SIGN_ROUNDS - 1):
+            if np.array_equal(place.pulls, place.taken):
                 break
-            guide, eta = place.guide, place.eta[: self.chain.linear_size]
+            place = self.look(u, place.guide, place.eta[: self.chain.linear_size])
+            if not self.chain.uses_force and np.array_equal(place.pulls, first.taken):
+                return first  # where these signs lead back to
         return place
 
     def look_at_rest(self, u: Array, guide: Array, eta: Array) -> Place:
@@ -198,6 +208,7 @@ class Climb:
         furthest = np.where(bends, MOST_BENT, FURTHEST)
         released = not bends.any() or bool(np.any(u[bends] != 0.0))
         best: Place | None = None
+        J = np.empty((0, 0))
         damping, promise, shortened = 1e-3, 0.0, False
         for _round in range(ROUNDS):
             place = look(u, guide, eta)
@@ -210,7 +221,7 @@ class Climb:
                     kept = (place.objective - best.objective) / max(promise, 1e-12)
                 damping *= 4.0 if kept < KEPT[0] else 0.2 if kept > KEPT[1] else 1.0
                 damping = max(damping, 1e-6)
-                best = place
+                best, J = place, self.slopes(place)
             else:
                 waiting = False
                 damping = max(8.0 * damping, RIDGE)
@@ -218,7 +229,7 @@ class Climb:
                     break
             # What depends on the force is fed with the model's own.
             guide, eta = best.guide, best.eta[: self.chain.linear_size]
-            J, misfit = best.J, float(best.residual @ best.residual)
+            misfit = float(best.residual @ best.residual)
             hessian = J.T @ J + np.eye(J.shape[1])
             gradient = J.T @ best.residual - np.concatenate([best.u, best.eta])
             free = np.ones(len(hessian), dtype=bool)

@@ -113,7 +113,8 @@ def _fitted(effects: frozenset[str], climb: Climb, place: Place, doubt: float) -
     """The fit at a mode, with Laplace's evidence."""
     problem, p = climb.problem, climb.chain.linear_size
     eta, zeta = np.split(place.eta, [p])
-    hessian = place.J.T @ place.J + np.eye(place.J.shape[1])
+    J = climb.slopes(place)
+    hessian = J.T @ J + np.eye(J.shape[1])
     factor = linalg.cho_factor(hessian, lower=True)
     log_det = 2.0 * float(np.sum(np.log(np.diagonal(factor[0]))))
     constant = problem.log_dets[climb.size] + len(problem) * np.log(2.0 * np.pi)

@@ -143,18 +143,20 @@ def fitted(
     free: Ranked | None = None,
     worth: float = -np.inf,
     seed: int = 0,
+    near: Ranked | None = None,
 ) -> Ranked | None:
     """A model with Laplace's evidence; None where no climb ends.
 
     ``free`` is the same model with moduli free at each level, which a law with rates starts from; their
-    further modes are looked for where about this evidence (nats) makes it ``worth`` while.
+    further modes are looked for where about this evidence (nats) makes it ``worth`` while. ``near`` is a
+    model with the same parameters, which the climbs start from.
     """
     if rate_names(simulation.law, simulation.order) and free is None:
         free = fitted(problem, simulation.model_copy(update={"law": FREE}))
     with warnings.catch_warnings():
         # Where a model is hopeless, its misfit outweighs every prior: nothing to be warned of.
         warnings.simplefilter("ignore", linalg.LinAlgWarning)
-        fits = _climbs(problem, simulation, free, worth, seed)
+        fits = _climbs(problem, simulation, free, worth, seed, near)
     return _ranked(problem, simulation, fits) if fits else None
 
 
@@ -173,7 +175,12 @@ def integrated(ranked: Ranked) -> Ranked:
 
 
 def _climbs(
-    problem: Problem, simulation: Simulation, free: Ranked | None, worth: float, seed: int
+    problem: Problem,
+    simulation: Simulation,
+    free: Ranked | None,
+    worth: float,
+    seed: int,
+    near: Ranked | None,
 ) -> list[Fit]:
     """The best fit for each size of the remainder, from the largest down to where they have no more to say.
 
@@ -182,10 +189,11 @@ def _climbs(
     blueprint = blueprint_of(problem, simulation)
     targets = _rates_by_size(problem, simulation, free)
     telling = max((t.fit.log_evidence for t in targets.values()), default=0.0) - SMOOTHED
+    like = {} if near is None else {f.size: f for f in near.fits}
     found: dict[int, Fit] = {}
     known: Array | None = None
     for size in reversed(range(len(SIZES))):
-        start = _at(found.get(size + 1))
+        start = _at(found.get(size + 1, like.get(size)))
         try:
             if size in targets:
                 wanted = worth if targets[size].fit.log_evidence >= telling else np.inf
@@ -231,7 +239,13 @@ def _by_law(space: Sequence[Simulation]) -> list[dict[str, Simulation]]:
 def _fit_plain(group: dict[str, Simulation]) -> dict[str, Ranked | None]:
     """The laws without rates of a group."""
     problem = held_problem()
-    return {law: fitted(problem, s) for law, s in group.items() if law not in (SHARED, EACH)}
+    found: dict[str, Ranked | None] = {}
+    near: Ranked | None = None
+    for law, simulation in group.items():
+        if law not in (SHARED, EACH):
+            found[law] = fitted(problem, simulation, near=near)
+            near = found[law] or near
+    return found
 
 
 def _fit_rates(task: tuple[dict[str, Simulation], Ranked | None, float]) -> list[Ranked]:
