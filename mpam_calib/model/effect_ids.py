@@ -32,9 +32,9 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "dead_band": ("bent", "soft"),
     "rate_friction": ("bent", "viscous", "viscous-bent"),
     "presliding": ("bent", "rest", "ramp", "rest-bent", "ramp-bent"),
-    "stress_softening": ("bent", "force", "force-bent"),
+    "stress_softening": ("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),
     "creep": ("bent", "wall", "wall-bent"),
-    "force_drift": ("bent", "settling", "settling-bent"),
+    "force_drift": ("bent", "settling", "settling-bent", "tared", "tared-bent"),
 }
 """Other forms of the effects, declared as ``id:form``."""
 

@@ -16,9 +16,11 @@ class Readings:
     """Rows (n,) that a force is wanted for.
 
     ``sign`` is s: +1 loading, −1 unloading, 0 neither; ``level`` is −1 where no level is meant;
-    ``time`` runs over the whole test and ``time_at_level`` since the level was reached (s);
-    ``cycle`` counts from 1 within a level; ``travel`` is the distance since the last reversal (m)
-    and ``reversal`` 0 on a stroke that no reversal began; ``speed`` in m/s (0: at rest).
+    ``time`` runs over the whole test, ``file_time`` on its file's own clock and ``time_at_level`` since the
+    level was reached (s);
+    ``cycle`` counts from 1 within a level and ``test_cycle`` over the whole test; ``travel`` is the
+    distance since the last reversal (m) and ``reversal`` 0 on a stroke that no reversal began; ``speed`` in
+    m/s (0: at rest).
     """
 
     pressure: Array
@@ -26,8 +28,10 @@ class Readings:
     sign: Array
     level: Ints
     time: Array
+    file_time: Array
     time_at_level: Array
     cycle: Array
+    test_cycle: Array
     travel: Array
     reversal: Array
     speed: Array
@@ -60,8 +64,10 @@ class Readings:
             sign=s,
             level=np.full(p.shape, -1, dtype=np.int64),
             time=zero,
+            file_time=zero,
             time_at_level=zero,
             cycle=zero + SETTLED,
+            test_cycle=zero + SETTLED,
             travel=zero + FAR,
             reversal=zero,
             speed=zero,

@@ -160,8 +160,10 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2) -> LoopBins:
         "sign": np.where(np.abs(loops.branch[starts]) == 1, loops.branch[starts], 0).astype(np.float64),
         "level": loops.level[starts],
         "time": mean(loops.time_s),
+        "file_time": mean(loops.time_s - loops.began_s),
         "time_at_level": mean(at_level),
         "cycle": loops.cycle[starts].astype(np.float64),
+        "test_cycle": rows.test_cycle[starts],
         "reversal": reversal[starts],
         "speed": np.exp(moving_mean(np.log(np.maximum(speed, 1e-12)))),
     }

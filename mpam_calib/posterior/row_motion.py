@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
+from mpam_calib.specimen.motion import run_ids, run_starts
 from mpam_calib.specimen.recording import Loops
 
 Array = NDArray[np.float64]
@@ -29,12 +30,23 @@ def row_readings(loops: Loops) -> Readings:
         sign=np.where(np.abs(loops.branch) == 1, loops.branch, 0).astype(np.float64),
         level=loops.level,
         time=loops.time_s,
+        file_time=loops.time_s - loops.began_s,
         time_at_level=at_level,
         cycle=loops.cycle.astype(np.float64),
+        test_cycle=test_cycles(loops),
         travel=travel,
         reversal=reversal[segment],
         speed=speeds(loops, first, first + lengths - 1, segment)[0],
     )
+
+
+def test_cycles(loops: Loops) -> Array:
+    """Cycles (rows,) counted over the whole test, from 1."""
+    run = run_ids(loops.clock, loops.level)
+    start = run_starts(run)
+    first, last = (f.reduceat(loops.cycle, start) for f in (np.minimum, np.maximum))
+    before = np.concatenate([[0], np.cumsum(last - first + 1)[:-1]])
+    return np.asarray(loops.cycle + (before - first + 1)[run], dtype=np.float64)
 
 
 def history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array]:

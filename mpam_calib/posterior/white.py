@@ -65,7 +65,7 @@ class Nodes:
 
         at_nodes, left = fit(force)
         at_rows = Readings.join([rows.take(start)] * 3)
-        moving = ("pressure", "displacement", "time", "time_at_level", "travel", "speed")
+        moving = ("pressure", "displacement", "time", "file_time", "time_at_level", "travel", "speed")
         outer = 0.5 / fourth
         return Nodes(
             Readings(**{**vars(at_rows), **{name: fit(getattr(rows, name))[0].ravel() for name in moving}}),

@@ -72,7 +72,7 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
     if anew:
         notes.append(
             f"loops: the clock begins anew in {anew} of {len(frames)} files; they count as recorded in the "
-            "order given, without a pause (a drift goes on from file to file)"
+            "order given, without a pause"
         )
     rows = pd.concat([frame[sorted(everywhere)] for frame in frames], ignore_index=True)
     pressure = rows["pressure_kPa"].to_numpy() * KPA
@@ -84,8 +84,9 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
             cycle = cycles_at_turns(cycle, run_ids(clock, level), branch)
     else:
         cycle = number_cycles(level, clock, branch)
+    time, began = one_after_the_other(times)
     loops = Loops(
-        time_s=one_after_the_other(times),
+        time_s=time,
         pressure_Pa=pressure,
         displacement_m=rows["displacement_mm"].to_numpy() * MM,
         force_N=rows["force_N"].to_numpy(),
@@ -94,6 +95,7 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
         branch=branch,
         stroke=run_ids(clock, level, cycle, branch),
         clock=clock,
+        began_s=began,
         censored=rows["censored"].to_numpy() > 0.5,
         averaged=averaged,
         unclear=unclear if unclear.any() else None,
@@ -102,17 +104,22 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
     return LoopsRead(loops, levels_Pa, tuple(counts), tuple(notes))
 
 
-def one_after_the_other(times: Sequence[Floats]) -> Floats:
-    """The test's time, s: a file whose clock has begun anew follows the one before, as if without a pause.
+def one_after_the_other(times: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """The test's time since its first reading, s, and when on it each row's clock began.
 
-    What goes on over the whole test (a load cell's drift) goes on over its files.
+    A file whose clock has begun anew follows the one before, as if without a pause: what goes on over the
+    whole test (a load cell's drift) goes on over its files, unless the cell was tared before each.
     """
-    found = [times[0]]
-    for time in times[1:]:
-        end = float(found[-1][-1])
-        step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
-        found.append(time if time[0] > end else time - time[0] + end + step)
-    return np.concatenate(found)
+    found, began = [times[0] - times[0][0]], [np.zeros(len(times[0]))]
+    for before, time in pairwise(times):
+        if time[0] > before[-1]:
+            start, first = float(began[-1][-1]), float(found[-1][-1]) + float(time[0] - before[-1])
+        else:
+            step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+            start = first = float(found[-1][-1]) + step
+        found.append(time - time[0] + first)
+        began.append(np.full(len(time), start))
+    return np.concatenate(found), np.concatenate(began)
 
 
 def _read_file(file: DataFile, averaged: int, floor_N: float | None) -> tuple[pd.DataFrame, int]:

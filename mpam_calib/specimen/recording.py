@@ -33,7 +33,8 @@ class Loops:
     """Force-displacement loops in time order; every array has shape (rows,).
 
     ``stroke`` numbers the contiguous runs of one file, level, cycle and branch, from 0; ``clock``
-    numbers the files, each of which may have its own clock: ``time_s`` goes on from file to file.
+    numbers the files, each of which may have its own clock: ``time_s`` goes on from file to file, and such
+    a clock began at ``began_s`` on it.
     ``averaged`` is how many consecutive rows of a very large file each entry stands for (1 otherwise).
     ``unclear`` rows, at turns, tell of the motion, but their force may belong to the other branch.
     ``temperature_C`` is there only where every loops file has the column.
@@ -49,6 +50,7 @@ class Loops:
     stroke: Ints
     clock: Ints
     censored: Bools
+    began_s: Floats | float = 0.0
     averaged: int = 1
     unclear: Bools | None = None
     temperature_C: Floats | None = None

@@ -90,11 +90,12 @@ def test_setpoints_only_group(tmp_path: Path) -> None:
 
 
 def test_time_goes_on_from_file_to_file() -> None:
-    """A clock that begins anew follows the file before; one that all files share is left as it is."""
-    first, again, shared = np.arange(4.0), 7.0 + 0.5 * np.arange(3), 50.0 + np.arange(2)
-    found = one_after_the_other([first, again - 7.0, shared])
-    assert found.tolist() == [0.0, 1.0, 2.0, 3.0, 3.5, 4.0, 4.5, 50.0, 51.0]
-    assert one_after_the_other([first]).tolist() == first.tolist()
+    """A clock that begins anew follows the file before; one that goes on keeps its pauses."""
+    first, again, goes_on = 70.0 + np.arange(4.0), 7.0 + 0.5 * np.arange(3), 50.0 + np.arange(2)
+    time, began = one_after_the_other([first, again, goes_on])
+    assert time.tolist() == [0.0, 1.0, 2.0, 3.0, 3.5, 4.0, 4.5, 46.5, 47.5]
+    assert began.tolist() == [0.0] * 4 + [3.5] * 5
+    assert one_after_the_other([first])[0].tolist() == np.arange(4.0).tolist()
 
 
 def test_one_file_for_each_pressure_with_its_own_clock(tmp_path: Path) -> None:

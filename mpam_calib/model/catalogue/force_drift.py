@@ -30,6 +30,11 @@ def _settling(state: State, values: Values, setting: Setting) -> State:
     return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
 
 
+def _tared(state: State, values: Values, setting: Setting) -> State:
+    """Anew in each file with a clock of its own: the cell was tared before."""
+    return replace(state, zero=state.zero + values["drift_N_per_min"] * state.readings.file_time)
+
+
 register(
     Effect(
         id="force_drift",
@@ -40,8 +45,8 @@ register(
         source="linear in time over the whole test",
         parameters=_parameters,
         apply=_apply,
-        forms={"settling": _settling},
-        kinds=("settling",),
+        forms={"settling": _settling, "tared": _tared},
+        kinds=("settling", "tared"),
         bends={"time": 5},
         looseness=4.0,
     )

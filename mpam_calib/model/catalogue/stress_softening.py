@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
+
+Array = NDArray[np.float64]
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -19,15 +22,29 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     )
 
 
+def _excess(values: Values, cycle: Array) -> Array:
+    return np.asarray(values["first_cycle_fraction"] * np.exp(-(cycle - 1.0)))
+
+
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    gain = 1.0 + values["first_cycle_fraction"] * np.exp(-(state.readings.cycle - 1.0))
+    gain = 1.0 + _excess(values, state.readings.cycle)
     return replace(state, wall_gain=state.wall_gain * gain)
 
 
 def _force(state: State, values: Values, setting: Setting) -> State:
     """The whole muscle is stiffer, not the bladder alone."""
-    gain = 1.0 + values["first_cycle_fraction"] * np.exp(-(state.readings.cycle - 1.0))
-    return replace(state, gain=state.gain * gain)
+    return replace(state, gain=state.gain * (1.0 + _excess(values, state.readings.cycle)))
+
+
+def _test(state: State, values: Values, setting: Setting) -> State:
+    """In the first cycles of the whole test: what has softened stays soft at the levels that follow."""
+    gain = 1.0 + _excess(values, state.readings.test_cycle)
+    return replace(state, wall_gain=state.wall_gain * gain)
+
+
+def _test_force(state: State, values: Values, setting: Setting) -> State:
+    """The whole muscle, in the first cycles of the whole test."""
+    return replace(state, gain=state.gain * (1.0 + _excess(values, state.readings.test_cycle)))
 
 
 register(
@@ -40,8 +57,8 @@ register(
         source="exponential in the cycle count: bladder stress × (1 + fraction·e^(1 − cycle))",
         parameters=_parameters,
         apply=_apply,
-        forms={"force": _force},
-        kinds=("force",),
+        forms={"force": _force, "test": _test, "test-force": _test_force},
+        kinds=("force", "test", "test-force"),
         bends={"cycle": 2, "cycles": 1, "contraction": 1},
         looseness=3.0,
     )
