@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -116,4 +116,14 @@ def workers(target: Collapsed, wanted: int) -> Iterator[Workers]:
             # Nobody waits for what they are at.
             for child in set(multiprocessing.active_children()) - others:
                 child.kill()
+            _let_go(executor)
             raise
+
+
+def _let_go(executor: ProcessPoolExecutor) -> None:
+    """End the results of workers that were killed: the rest of one half sent would be waited for for ever.
+
+    The executor reads until the last end to write to is closed, and one of them is its own.
+    """
+    with suppress(AttributeError, OSError):  # another Python's executor
+        executor._result_queue._writer.close()  # type: ignore[attr-defined]
