@@ -99,6 +99,7 @@ class Blueprint(Value):
             duration=self.duration,
             level_time=self.level_time,
             speed=self.speed,
+            strokes=np.array(self.reach) * self.geometry.L0,
         )
 
 

@@ -49,7 +49,8 @@ class Effect:
     degrees) along which its parameters may vary, all alike, in the form ``id:bent``
     (:mod:`mpam_calib.model.bend`), ``looseness`` how many times as far as usual, and ``kinds`` those of its
     forms that differ from it in kind and may bend too (``id:form-bent``); an effect without parameters then
-    reads its size under its own id.
+    reads its size under its own id. Bends multiply a size; where it may come back to nothing and pass it,
+    they are ``added`` in units of its prior sd.
     """
 
     id: str
@@ -65,6 +66,7 @@ class Effect:
     needs_braid: bool = False
     bends: Mapping[str, int] = field(default_factory=dict)
     looseness: float = 1.0
+    added: bool = False
     kinds: tuple[str, ...] = ()
 
     @property
@@ -114,7 +116,12 @@ def bent(item: Effect) -> Effect:
     def apply(state: State, values: Values, setting: Setting) -> State:
         sizes = {p.name: values[p.name] for p in item.parameters(setting)} or {item.id: np.ones((1, 1))}
         factor = bend_factor(next(iter(sizes)), item.bends, values, state, setting)
-        return item.apply(state, {**values, **{name: size * factor for name, size in sizes.items()}}, setting)
+        if item.added:
+            units = {p.name: p.prior.sd for p in item.parameters(setting)}
+            bent_sizes = {name: size + units[name] * (factor - 1.0) for name, size in sizes.items()}
+        else:
+            bent_sizes = {name: size * factor for name, size in sizes.items()}
+        return item.apply(state, {**values, **bent_sizes}, setting)
 
     return replace(item, parameters=parameters, apply=apply)
 

@@ -33,6 +33,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "rate_friction": ("bent", "viscous", "viscous-bent"),
     "presliding": ("bent", "rest", "ramp", "rest-bent", "ramp-bent"),
     "stress_softening": ("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),
+    "pressure_droop": ("bent", "level", "level-bent"),
     "creep": ("bent", "wall", "wall-bent"),
     "force_drift": ("bent", "settling", "settling-bent", "tared", "tared-bent"),
 }

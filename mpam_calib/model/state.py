@@ -42,6 +42,8 @@ class Setting:
     """Longest time spent at one level, s."""
     speed: float = 50.0 * MM / MINUTE
     """Geometric mean of the strokes' speeds, m/s; without loops the thesis's."""
+    strokes: Array | None = None
+    """Largest recorded displacement at each level, m; None where they are not told apart."""
 
     @property
     def top_pressure(self) -> float:

@@ -49,5 +49,6 @@ register(
         kinds=("settling", "tared"),
         bends={"time": 5},
         looseness=4.0,
+        added=True,
     )
 )

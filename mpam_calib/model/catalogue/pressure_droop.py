@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import HalfNormal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -18,6 +20,15 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, pressure=state.pressure * (1.0 - values["droop_percent"] * part))
 
 
+def _level(state: State, values: Values, setting: Setting) -> State:
+    """In proportion to each level's own stroke."""
+    if setting.strokes is None:
+        return _apply(state, values, setting)
+    strokes = np.where(setting.strokes > 0.0, setting.strokes, setting.stroke)
+    part = state.displacement / np.interp(state.readings.pressure, setting.levels, strokes)
+    return replace(state, pressure=state.pressure * (1.0 - values["droop_percent"] * part))
+
+
 register(
     Effect(
         id="pressure_droop",
@@ -28,6 +39,8 @@ register(
         source="first order in the stroke: P(1 − droop·x/stroke)",
         parameters=_parameters,
         apply=_apply,
+        forms={"level": _level},
+        kinds=("level",),
         bends={"contraction": 3},
         looseness=2.0,
     )
