@@ -67,6 +67,7 @@ DRIVERS: Final[Mapping[str, Callable[[State, Setting], Array]]] = {
         2.0 * np.log1p(state.readings.time_at_level) / np.log1p(max(setting.level_time, 1.0)) - 1.0
     ),
     "cycle": lambda state, setting: 2.0 / state.readings.cycle - 1.0,
+    "branch": lambda state, setting: state.readings.sign,
     "cycles": lambda state, setting: (state.readings.cycle - 1.0) / CYCLES - 1.0,
     "speed": _speed,
     "travel": _travel,

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from rig import unusual
 from rig.chain import force_of
+from rig.conventions import CONVENTIONS
 from rig.effects import shared_form
 from rig.unusual import Unusual
 
@@ -124,3 +125,34 @@ def test_textbook_causes_are_named(
         print(f"\n{len(all_made)} tests; missed: {missed}")
     assert 1.0 - len(missed) / len(all_made) >= share
     assert len(wrong) <= 0.1 * len(all_made)
+
+
+def named(convention: str, seeds: Iterable[int], folder: Path) -> tuple[int, list[str], int]:
+    """How many tests with a cause by this convention name it alone, which another set, and how many there are."""
+    right, wrong, count = 0, [], 0
+    for seed in seeds:
+        made = unusual.draw(seed, 1, convention)
+        if made is not None:
+            word, standing = verdict(made, folder / f"{convention}-{seed}")
+            truth = frozenset(made.sizes)
+            right += (word, standing) == ("named", truth)
+            wrong += [f"{convention}-{seed}"] * (word == "named" and standing != truth)
+            count += 1
+    return right, wrong, count
+
+
+@pytest.mark.parametrize("convention", ["tared", "softened_once"])
+def test_a_cause_by_another_convention_is_named(convention: str, tmp_path: Path) -> None:
+    assert named(convention, [1], tmp_path) == (1, [], 1)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_causes_by_other_conventions_are_named(
+    convention: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    right, wrong, count = named(convention, range(100, 112), tmp_path)
+    with capsys.disabled():
+        print(f"\n{convention}: {right} of {count}, another set in {wrong}")
+    assert right >= 0.75 * count
+    assert len(wrong) <= 1

@@ -3,19 +3,20 @@
 Strokes that grow, that do not come back to the initial length or that hold a smaller loop; trapezoids; speeds
 that change from cycle to cycle; readings anywhere in a step, at uneven times, with rows lost; levels in any
 order; coarse encoders; columns left out; a file for each level, with a clock of its own. What is hidden has
-the plain textbook form.
+the plain textbook form, or one of `conventions.py`.
 """
 
 from __future__ import annotations
 
 import random
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from .case import Case, specimen_toml
-from .chain import force_of
+from .chain import Form, force_of
+from .conventions import CONVENTIONS
 from .effects import shared_form
 from .muscle import Array, Muscle, free_contraction, static_force
 from .protocol import Protocol, Rows, sensor_noise
@@ -68,11 +69,14 @@ class Unusual:
     force: Array
 
 
-def draw(seed: int, count: int) -> Unusual | None:
-    """A test with so many causes; None where the drawn muscle cannot carry it."""
+def draw(seed: int, count: int, convention: str | None = None) -> Unusual | None:
+    """A test with so many causes, one of them by this convention; None where the muscle cannot carry it."""
     rng = random.Random(1000 * count + seed)
-    ids, muscle, levels = _specimen(rng, count)
+    other = None if convention is None else CONVENTIONS[convention]
+    ids, muscle, levels = _specimen(rng, count, None if other is None else other.id)
     habits = _habits(rng, ids)
+    if convention == "tared":
+        habits = replace(habits, a_file_each=True)
     blocked = float(static_force(muscle, np.array([max(levels)]), np.array([0.0]))[0])
     white = blocked * rng.choice([0.0015, 0.003, 0.004])
     protocol = Protocol(
@@ -85,7 +89,8 @@ def draw(seed: int, count: int) -> Unusual | None:
     for _ in range(4):
         rows = _rows(protocol, habits, muscle, share, seed)
         sizes = {w.id: solved_size(w, muscle, rows, noise, seed) for w in wanted}
-        force = force_of(muscle, rows, [(shared_form(i), z) for i, z in sizes.items()], seed=seed)
+        hidden = [(_form(i, other), z) for i, z in sizes.items()]
+        force = force_of(muscle, rows, hidden, seed=seed)
         if sizes.get("presliding", np.inf) < SEEN_MM:
             return None
         if not np.any(force < 0.0):  # nobody pushes a muscle together
@@ -95,10 +100,18 @@ def draw(seed: int, count: int) -> Unusual | None:
     return None
 
 
-def _specimen(rng: random.Random, count: int) -> tuple[list[str], Muscle, tuple[float, ...]]:
+def _form(identifier: str, other: Form | None) -> Form:
+    return other if other is not None and other.id == identifier else shared_form(identifier)
+
+
+def _specimen(
+    rng: random.Random, count: int, needed: str | None
+) -> tuple[list[str], Muscle, tuple[float, ...]]:
     while True:
         tensile = rng.random() < 0.6
         ids = sorted(rng.sample(SEEN_BY_TENSILE if tensile else SEEN_BY_LOOPS, count))
+        if needed is not None and needed not in ids:
+            continue
         if {"coulomb_friction", "strand_friction"} <= set(ids):
             continue
         frictions = ["coulomb", "strand", "none"]

@@ -41,7 +41,7 @@ register(
         apply=_apply,
         forms={"level": _level},
         kinds=("level",),
-        bends={"contraction": 3},
+        bends={"contraction": 3, "speed": 1},
         looseness=2.0,
     )
 )

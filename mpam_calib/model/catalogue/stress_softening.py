@@ -59,7 +59,7 @@ register(
         apply=_apply,
         forms={"force": _force, "test": _test, "test-force": _test_force},
         kinds=("force", "test", "test-force"),
-        bends={"cycle": 2, "cycles": 1, "contraction": 1},
+        bends={"cycle": 2, "cycles": 1, "contraction": 1, "branch": 1},
         looseness=3.0,
     )
 )

@@ -1,0 +1,86 @@
+"""What an effect's words leave open: other clocks, counts and strokes than the textbook form's.
+
+Each is the textbook form with one thing taken otherwise, as another engineer may well take it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from .chain import Form, State
+from .effects import shared_form
+from .muscle import Array
+from .protocol import Rows
+
+
+def _cycles_before(rows: Rows) -> Array:
+    """Cycles of the whole test before the present one."""
+    found, before = np.zeros(rows.count), 0.0
+    for level in dict.fromkeys(rows.level.tolist()):
+        here = rows.level == level
+        found[here] = before + rows.cycle[here] - 1.0
+        before += float(rows.cycle[here].max())
+    return found
+
+
+def _stiffer(excess: Callable[[Rows], Array]) -> Callable[[State, float], None]:
+    def apply(state: State, size: float) -> None:
+        gain = 1.0 + size * excess(state.rows)
+        state.history.append(lambda force: force * gain)
+
+    return apply
+
+
+def _zero(path: Callable[[Rows], Array]) -> Callable[[State, float], None]:
+    """Paths in minutes."""
+
+    def apply(state: State, size: float) -> None:
+        state.sensor = state.sensor + size * path(state.rows)
+
+    return apply
+
+
+def _drooping(share: Callable[[Rows], Array]) -> Callable[[State, float], None]:
+    def apply(state: State, size: float) -> None:
+        state.pressure = state.pressure * (1.0 - 0.01 * size * share(state.rows))
+
+    return apply
+
+
+def _there_and_back(rows: Rows) -> Array:
+    """Minutes of a zero that wanders and comes back."""
+    test = float(rows.time.max())
+    return np.asarray(np.sin(2.0 * np.pi * rows.time / test) * test / 120.0)
+
+
+def _first_stretching(rows: Rows) -> Array:
+    return ((rows.cycle < 1.5) & (rows.direction < 0.0)).astype(float)
+
+
+def _lagging(rows: Rows) -> Array:
+    return rows.level_fraction * rows.nominal_speed / rows.nominal_speed.max()
+
+
+def _by(name: str, effect: str, apply: Callable[[State, float], None]) -> Form:
+    return replace(shared_form(effect), name=name, apply=apply, shared=False)
+
+
+CONVENTIONS: dict[str, Form] = {
+    form.name: form
+    for form in (
+        # The cell is tared before each file (which then has a clock of its own).
+        _by("tared", "force_drift", _zero(lambda rows: rows.level_time / 60.0)),
+        _by("there_and_back", "force_drift", _zero(_there_and_back)),
+        # Rubber that softened at one level stays soft at the next.
+        _by("softened_once", "stress_softening", _stiffer(lambda rows: 0.5 ** _cycles_before(rows))),
+        # Only the first stretching is stiffer, not the way back.
+        _by("first_stretching", "stress_softening", _stiffer(_first_stretching)),
+        # Full stroke is each level's own.
+        _by("own_stroke", "pressure_droop", _drooping(lambda rows: rows.level_fraction)),
+        # A regulator that does not keep up: in proportion to the speed as well.
+        _by("lagging", "pressure_droop", _drooping(_lagging)),
+    )
+}
