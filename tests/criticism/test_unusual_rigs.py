@@ -128,7 +128,7 @@ def test_textbook_causes_are_named(
 
 
 def named(convention: str, seeds: Iterable[int], folder: Path) -> tuple[int, list[str], int]:
-    """How many tests with a cause by this convention name it alone, which another set, and how many there are."""
+    """How many tests with a cause by this convention name it alone, which another set, of how many."""
     right, wrong, count = 0, [], 0
     for seed in seeds:
         made = unusual.draw(seed, 1, convention)

@@ -198,6 +198,46 @@ def test_a_drift_that_settles_ends_where_the_straight_one_does() -> None:
     assert np.all(late > straight)
 
 
+def test_a_drift_that_comes_back_passes_its_zero() -> None:
+    """Added bends: with no size at all the slope is sd·Σ c_j P_j; at the test's end, where P_j = 1, too."""
+    form = "force_drift:tared-bent"
+    setting = setting_for(form)
+    readings = replace(rows(setting), file_time=7.0 * np.ones(40))
+    given = {p.name: np.zeros((1, 1)) for p in effect(form).parameters(setting)}
+    given |= {"drift_N_per_min_bend_1": np.array([[0.4]]), "drift_N_per_min_bend_2": np.array([[-0.3]])}
+    zero = effect(form).apply(Chain(setting, None, False).start(readings, np.zeros(1)), given, setting).zero
+    v = np.clip(2.0 * readings.time / max(setting.duration, 1.0) - 1.0, -1.5, 1.5)
+    slope = np.polynomial.legendre.legval(v, [0.0, 0.4, -0.3])
+    unit = effect("force_drift").parameters(setting)[0].prior.sd
+    np.testing.assert_allclose(zero[0], 7.0 * unit * slope, rtol=1e-12)
+
+
+def test_what_softened_at_one_level_stays_soft_at_the_next() -> None:
+    setting = setting_for("stress_softening:test-force")
+    readings = replace(rows(setting), test_cycle=np.arange(40.0) + 1.0)
+    start = Chain(setting, None, False).start(readings, np.zeros(1))
+    given = {"first_cycle_fraction": np.array([[0.2]])}
+    expected = 1.0 + 0.2 * np.exp(-np.arange(40.0))
+    for form, name in (("test-force", "gain"), ("test", "wall_gain")):
+        gain = getattr(effect(f"stress_softening:{form}").apply(start, given, setting), name)
+        np.testing.assert_allclose(gain[0], expected, rtol=1e-12)
+
+
+def test_full_stroke_may_be_each_levels_own() -> None:
+    """Between levels their strokes are interpolated; a level without any has the longest."""
+    setting = setting_for("pressure_droop:level")
+    strokes = setting.stroke * np.linspace(0.4, 1.0, len(setting.levels))
+    strokes[0] = 0.0
+    setting = replace(setting, strokes=strokes)
+    readings = rows(setting)
+    start = Chain(setting, None, False).start(readings, np.zeros(1))
+    given = {"droop_percent": np.array([[0.03]])}
+    pressure = effect("pressure_droop:level").apply(start, given, setting).pressure[0]
+    strokes[0] = setting.stroke
+    own = np.interp(readings.pressure, setting.levels, strokes)
+    np.testing.assert_allclose(pressure, readings.pressure * (1.0 - 0.03 * readings.displacement / own))
+
+
 def test_the_list_of_forms_is_that_of_the_effects() -> None:
     """Specimen files are checked against a list that does not import the effects: it must be theirs."""
     for identifier in known_effects():

@@ -53,6 +53,27 @@ def test_travel_begins_at_the_turn(rows):
     assert row_readings(made).travel == pytest.approx(exact["travel"], abs=1e-3 * STROKE)
 
 
+def test_cycles_of_the_test_go_on_from_level_to_level():
+    """Three levels of two cycles, the second level met again at the end: 1, 2 | 3, 4 | 5, 6 | 7, 8."""
+    made = build.loops((100.0, 150.0, 200.0), 12.0, 12, cycles=2)
+    again = made.without(made.level != 1)
+    both = replace(
+        made,
+        **{
+            name: np.concatenate([getattr(made, name), getattr(again, name)])
+            for name in ("displacement_m", "force_N", "pressure_Pa", "level", "cycle", "branch", "censored")
+        },
+        clock=np.zeros(len(made.cycle) + len(again.cycle), dtype=np.int64),
+        time_s=np.concatenate([made.time_s, again.time_s + 1e4]),
+        stroke=np.concatenate([made.stroke, again.stroke - again.stroke[0] + made.stroke[-1] + 1]),
+    )
+    found = row_readings(both).test_cycle
+    expected = both.cycle + np.concatenate([2.0 * made.level, np.full(len(again.cycle), 6.0)])
+    np.testing.assert_array_equal(found, expected)
+    bins = bin_loops(both)
+    assert set(bins.readings.test_cycle) == set(range(1, 9))
+
+
 def test_travel_of_a_sudden_turn():
     """At full speed the turn lies half a step before the first reading (to rounding)."""
     made = build.loops((150.0,), 12.0, 12, cycles=2)
