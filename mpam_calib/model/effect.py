@@ -48,9 +48,9 @@ class Effect:
     point. ``needs_braid`` is set where it needs the declared strands. ``bends`` names the drivers (and
     degrees) along which its parameters may vary, all alike, in the form ``id:bent``
     (:mod:`mpam_calib.model.bend`), ``looseness`` how many times as far as usual, and ``kinds`` those of its
-    forms that differ from it in kind and may bend too (``id:form-bent``); an effect without parameters then
-    reads its size under its own id. Bends multiply a size; where it may come back to nothing and pass it,
-    they are ``added`` in units of its prior sd.
+    forms that differ from it in kind and may bend too (``id:form-bent``), with a few words for each. Bends
+    multiply a size; where it may come back to nothing and pass it, they are ``added`` in units of its prior
+    sd. A bent effect without parameters reads its size under its own id.
     """
 
     id: str
@@ -67,7 +67,7 @@ class Effect:
     bends: Mapping[str, int] = field(default_factory=dict)
     looseness: float = 1.0
     added: bool = False
-    kinds: tuple[str, ...] = ()
+    kinds: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def bent_forms(self) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mpam_calib.criticism.diagnose import Diagnosis
+from mpam_calib.model.bend import FORM
 from mpam_calib.model.effect import effect
 from mpam_calib.report import wording
 from mpam_calib.report.figures import misfit
@@ -175,7 +176,7 @@ def _causes(causes: list[dict[str, Any]]) -> list[Block]:
     rows = [
         {
             "cause": effect(c["id"]).title,
-            "what it means": effect(c["id"]).sentence,
+            "what it means": _meaning(c["id"], c["form"]),
             "probability": probability(c["probability"]),
             "parameter": name,
             "mean": values["mean"],
@@ -189,6 +190,13 @@ def _causes(causes: list[dict[str, Any]]) -> list[Block]:
     ]
     formats = dict.fromkeys(["mean", "5 %", "95 %", "share of misfit"], "{:.3g}") | {"probability": "{}"}
     return [Text(FORMS), DataTable(pd.DataFrame(rows), "Causes with their sizes (90 % bands)", formats)]
+
+
+def _meaning(identifier: str, form: str) -> str:
+    """The effect's sentence, and what its form takes otherwise."""
+    item = effect(identifier)
+    words = item.kinds.get(form.removesuffix(FORM).removesuffix("-"))
+    return f"{item.sentence} ({words})" if words else item.sentence
 
 
 def _alternatives(content: dict[str, Any]) -> list[Block]:

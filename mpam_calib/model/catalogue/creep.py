@@ -42,7 +42,7 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"wall": _wall},
-        kinds=("wall",),
+        kinds={"wall": "here the bladder's alone"},
         bends={"level_time": 4},
         looseness=1.5,
     )

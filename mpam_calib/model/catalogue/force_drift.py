@@ -46,7 +46,10 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"settling": _settling, "tared": _tared},
-        kinds=("settling", "tared"),
+        kinds={
+            "settling": "most of it early in the test",
+            "tared": "here anew in each file, as if tared before",
+        },
         bends={"time": 5},
         looseness=4.0,
         added=True,

@@ -56,7 +56,7 @@ register(
             "rest": _turning(_exponential, from_rest=True),
             "ramp": _turning(_ramp, from_rest=False),
         },
-        kinds=("rest", "ramp"),
+        kinds={"rest": "a level's first stroke starts from rest", "ramp": "in proportion to the travel"},
         bends={"travel": 3},
         looseness=2.0,
     )

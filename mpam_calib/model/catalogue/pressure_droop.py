@@ -40,7 +40,7 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"level": _level},
-        kinds=("level",),
+        kinds={"level": "here full stroke is each level's own"},
         bends={"contraction": 3, "speed": 1},
         looseness=2.0,
     )

@@ -52,7 +52,7 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"viscous": _viscous},
-        kinds=("viscous",),
+        kinds={"viscous": "here by friction in proportion to the speed, the same at any force"},
         bends={"speed": 2},
         looseness=2.0,
     )

@@ -58,7 +58,11 @@ register(
         parameters=_parameters,
         apply=_apply,
         forms={"force": _force, "test": _test, "test-force": _test_force},
-        kinds=("force", "test", "test-force"),
+        kinds={
+            "force": "here the whole muscle, not the bladder alone",
+            "test": "here in the first cycles of the whole test, not of each level",
+            "test-force": "here the whole muscle, in the first cycles of the whole test, not of each level",
+        },
         bends={"cycle": 2, "cycles": 1, "contraction": 1, "branch": 1},
         looseness=3.0,
     )
