@@ -13,6 +13,7 @@ from mpam_calib.specimen.recording import Floats, Ints
 from mpam_calib.units import KPA, MM
 
 HIGHEST_LEVEL_KPA = 5000.0
+HIGHEST_STRAIN = 20.0
 LEAST_STROKE = 0.005
 """Smaller largest displacements, as a share of L0, are taken for metres."""
 LONG_SHARE = 0.1
@@ -45,6 +46,17 @@ def check_force(label: str, kind: FileKind, force_N: Floats, shortening: Floats 
         found = f"a median force of {median:.3g} N (flipped sign?)"
         expected = f"pulling forces above 0; {map_hint(kind, 'force_N', '-1.0')}"
         raise InputError(label, found, expected, None, "force_N")
+
+
+def check_strain(label: str, strain: Floats, rows: Ints) -> None:
+    """Refuse strains that no rubber survives."""
+    high = np.flatnonzero(strain > HIGHEST_STRAIN)
+    if len(high):
+        found = f"{strain[high[0]]:g} (per cent?)"
+        expected = (
+            f"an engineering strain of at most {HIGHEST_STRAIN:g}; {map_hint('tensile', 'strain', '0.01')}"
+        )
+        raise InputError(label, found, expected, int(rows[high[0]]), "strain")
 
 
 def check_displacement(

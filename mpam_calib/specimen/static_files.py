@@ -12,7 +12,13 @@ from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import Geometry
 from mpam_calib.specimen.levels import medians_by_label, static_levels
 from mpam_calib.specimen.loops import censored_rows
-from mpam_calib.specimen.plausibility import check_contraction, check_force, check_pressure, map_hint
+from mpam_calib.specimen.plausibility import (
+    check_contraction,
+    check_force,
+    check_pressure,
+    check_strain,
+    map_hint,
+)
 from mpam_calib.specimen.recording import BlockedForce, Floats, ForceMap, FreeContraction, Tensile
 from mpam_calib.specimen.source import DataFile
 from mpam_calib.units import KPA
@@ -77,6 +83,7 @@ def read_tensile(files: Sequence[DataFile]) -> tuple[Tensile, tuple[int, ...]]:
             expected = f"tension above 0; {map_hint('tensile', 'stress_Pa', '-1.0')}"
             found = f"a median stress of {stress:.3g} Pa (flipped sign?)"
             raise InputError(file.label, found, expected, None, "stress_Pa")
+        check_strain(file.label, frame["strain"].to_numpy(), frame.index.to_numpy())
         frames.append(frame)
     rows = pd.concat(frames, ignore_index=True)
     return Tensile(rows["strain"].to_numpy(), rows["stress_Pa"].to_numpy()), tuple(map(len, frames))

@@ -18,6 +18,10 @@ WANDER_SHARE = 0.05
 """Pressure that strays further than this share from its level is worth a remark."""
 SPEED_SHARE = 0.1
 """Speeds closer than this are one speed."""
+USUAL_SHARE = 0.99
+"""Forces and pressures up to this quantile are the usual ones ..."""
+FAR = 30.0
+"""... and this many times as large is far from them; forces of muscles are within it of the gas's own."""
 
 _BRANCH_NAMES = {code: word or "none" for word, code in BRANCH_WORDS.items()}
 
@@ -125,6 +129,7 @@ def oddities(specimen: Specimen) -> list[str]:
     if loops is not None:
         remarks += _odd_times(loops)
         remarks += _odd_levels(loops, specimen.levels_Pa)
+    remarks += _odd_forces(specimen)
     remarks += _odd_contractions(specimen)
     for name, part in (
         ("loops", loops),
@@ -175,6 +180,36 @@ def _odd_levels(loops: Loops, levels_Pa: Floats) -> list[str]:
         idle = int((loops.branch[rows] == 0).sum())
         if idle:
             remarks.append(f"{name} has {idle} rows without a branch (before the first motion)")
+    return remarks
+
+
+def _odd_forces(specimen: Specimen) -> list[str]:
+    """Forces far from what the gas can pull, and readings far from all others."""
+    if specimen.geometry is None:
+        return []
+    geometry, remarks = specimen.geometry, []
+    # Chou and Hannaford 1996 (doi:10.1109/70.481753) at the initial length; alpha0 from the hoop direction.
+    per_pascal = 3.0 * math.tan(geometry.alpha0) ** 2 - 1.0 / math.cos(geometry.alpha0) ** 2
+    per_pascal *= math.pi * geometry.R0**2
+    for name, part in (
+        ("loops", specimen.loops),
+        ("force_map", specimen.force_map),
+        ("blocked_force", specimen.blocked_force),
+    ):
+        if part is None:
+            continue
+        usual = float(np.quantile(np.abs(part.force_N), USUAL_SHARE))
+        stray = int((np.abs(part.force_N) > FAR * usual).sum()) if usual > 0.0 else 0
+        if stray:
+            extreme = part.force_N[np.abs(part.force_N).argmax()]
+            many = "a force is" if stray == 1 else f"{stray} forces are"
+            remarks.append(f"{name}: {many} far from all others ({extreme:.4g} N)")
+        gas = per_pascal * float(np.quantile(part.pressure_Pa, USUAL_SHARE))
+        if gas > 0.0 and not gas / FAR < usual < FAR * gas:
+            remarks.append(
+                f"{name}: forces up to {usual:.3g} N, while the gas alone pulls about {gas:.3g} N at the "
+                "highest pressure; are the units of force, pressure and radius right?"
+            )
     return remarks
 
 
