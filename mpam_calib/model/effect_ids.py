@@ -31,7 +31,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(EFFECT_IDS, ("bent",)),
     "dead_band": ("bent", "soft"),
     "rate_friction": ("bent", "viscous", "viscous-bent"),
-    "presliding": ("bent", "rest", "ramp", "rest-bent", "ramp-bent"),
+    "presliding": ("bent", "rest", "sliding", "ramp", "rest-bent", "sliding-bent", "ramp-bent"),
     "stress_softening": ("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),
     "pressure_droop": ("bent", "level", "level-bent"),
     "creep": ("bent", "wall", "wall-bent"),

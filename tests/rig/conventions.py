@@ -64,6 +64,12 @@ def _lagging(rows: Rows) -> Array:
     return rows.level_fraction * rows.nominal_speed / rows.nominal_speed.max()
 
 
+def _sliding_at_first(state: State, size: float) -> None:
+    rows = state.rows
+    turning = 1.0 - 2.0 * np.exp(-rows.since_reversal / max(size, 1e-6))
+    state.turn = state.turn * np.where(rows.travel <= rows.since_reversal * (1.0 + 1e-9), 1.0, turning)
+
+
 def _by(name: str, effect: str, apply: Callable[[State, float], None]) -> Form:
     return replace(shared_form(effect), name=name, apply=apply, shared=False)
 
@@ -78,6 +84,8 @@ CONVENTIONS: dict[str, Form] = {
         _by("softened_once", "stress_softening", _stiffer(lambda rows: 0.5 ** _cycles_before(rows))),
         # Only the first stretching is stiffer, not the way back.
         _by("first_stretching", "stress_softening", _stiffer(_first_stretching)),
+        # No reversal begins a level's first stroke: friction does not turn over on it.
+        _by("sliding_at_first", "presliding", _sliding_at_first),
         # Full stroke is each level's own.
         _by("own_stroke", "pressure_droop", _drooping(lambda rows: rows.level_fraction)),
         # A regulator that does not keep up: in proportion to the speed as well.

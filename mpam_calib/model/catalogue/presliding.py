@@ -31,12 +31,16 @@ def _ramp(state: State, values: Values) -> Array:
     return np.maximum(1.0 - state.readings.travel / values["reversal_mm"], 0.0)
 
 
-def _turning(left: Callable[[State, Values], Array], *, from_rest: bool) -> Apply:
-    """Friction that turns over; a level's first stroke may start without it, not against it."""
+AGAINST, REST, SLIDING = 2.0, 1.0, 0.0
+"""How far friction turns on a level's first stroke: from against it, since pressurising moved the muscle;
+from none; or not at all, since no reversal began the stroke."""
+
+
+def _turning(left: Callable[[State, Values], Array], first: float) -> Apply:
+    """Friction that turns over, on a level's ``first`` stroke by so much."""
 
     def apply(state: State, values: Values, setting: Setting) -> State:
-        # Every stroke begins with a turn: before a level's first one the muscle was pressurised, and moved.
-        swing = 1.0 + state.readings.reversal if from_rest else 2.0
+        swing = first + (AGAINST - first) * state.readings.reversal
         return replace(state, sign=state.sign * (1.0 - swing * left(state, values)))
 
     return apply
@@ -51,12 +55,17 @@ register(
         told_by="small reversals in the middle of the stroke",
         source="Dahl's model at constant load: s(1 − 2 exp(−travel/reversal))",
         parameters=_parameters,
-        apply=_turning(_exponential, from_rest=False),
+        apply=_turning(_exponential, AGAINST),
         forms={
-            "rest": _turning(_exponential, from_rest=True),
-            "ramp": _turning(_ramp, from_rest=False),
+            "rest": _turning(_exponential, REST),
+            "sliding": _turning(_exponential, SLIDING),
+            "ramp": _turning(_ramp, AGAINST),
         },
-        kinds={"rest": "a level's first stroke starts from rest", "ramp": "in proportion to the travel"},
+        kinds={
+            "rest": "here a level's first stroke starts from rest",
+            "sliding": "here not on a level's first stroke",
+            "ramp": "here in proportion to the travel",
+        },
         bends={"travel": 3},
         looseness=2.0,
     )
