@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 RHAT_LIMIT = 1.01
 ESS_WANTED = 400.0
+SHORTEST = 10
+"""Steps below which a chain cannot show how long its draws hang together."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +44,17 @@ def diagnose_chains(chains: Array) -> Diagnostics:
 
     R-hat takes each ensemble as one chain: walkers of one ensemble lean on each other, so that
     R-hat over walkers would be content with all of them in a wrong mode. ESS is the smaller of
-    ArviZ's with each walker a chain (time must not be interleaved) and emcee's N/τ.
+    ArviZ's with each walker a chain (time must not be interleaved) and emcee's N/τ. Of chains too short
+    to tell, each ensemble counts as one draw.
     """
     E, T, W, d = chains.shape
     between, bulk, tail = np.empty(d), np.empty(d), np.empty(d)
     for i in range(d):
         x = chains[..., i]
         between[i] = rhat(x.reshape(E, T * W))
+        if T < SHORTEST:
+            bulk[i] = tail[i] = float(E)
+            continue
         separate = np.moveaxis(x, 2, 1).reshape(E * W, T)
         total = float(E * T * W)
         # A block that is shorter than τ cannot show it; τ is at least what the ensembles show apart.

@@ -29,6 +29,8 @@ THESIS_FORCE_SD = 0.25
 """N; 0.1 % of the thesis's 250 N load cell."""
 TYPICAL = 1.0
 """Standard normal image of a hidden effect's default size: a large but ordinary draw of its prior."""
+FARTHEST = 6.0
+"""Standard normal image of the largest size that may be hidden, and less this of the smallest."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,8 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
 
     With data: the mode fitted to them, at their rows. Without: the declared ``E_Pa`` and the thesis's
     protocol. ``hide`` maps effect ids to a size in lab units (None: a typical one). Raises
-    ``InputError`` for an id that is unknown, has no size to hide, or lacks what it needs.
+    ``InputError`` for an id that is unknown, has no size to hide, or lacks what it needs, and for a size
+    that its prior all but rules out.
     """
     rng = np.random.default_rng([seed, 8])
     fitted = specimen.has_muscle_data
@@ -130,7 +133,13 @@ def _with_hidden(
         hidden[identifier] = {}
         for parameter in parameters:
             factor = si_factor(parameter.name)
-            value = float(parameter.prior.from_normal(np.array(TYPICAL))) if size is None else size * factor
+            smallest, typical, largest = (
+                float(parameter.prior.from_normal(np.array(z))) for z in (-FARTHEST, TYPICAL, FARTHEST)
+            )
+            value = typical if size is None else size * factor
+            if not smallest <= value <= largest:
+                expected = f"between {smallest / factor:.3g} and {largest / factor:.3g} {parameter.unit}"
+                raise InputError(place, f"{identifier}={size:g}", expected.strip())
             if parameter.name in values:
                 raise InputError(place, f'"{identifier}"', f"an effect without the declared {parameter.name}")
             values[parameter.name] = np.full((1, 1), value)

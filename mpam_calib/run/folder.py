@@ -61,8 +61,8 @@ class RunFolder:
         return content if content.get("digest") == self.digest else None
 
     def complete(self) -> bool:
-        """Whether all that a finished calibration leaves is there."""
-        return all((self.path / name).is_file() for name in WRITTEN)
+        """Whether all that a finished calibration leaves is there, and its draws can be read."""
+        return all((self.path / name).is_file() for name in WRITTEN) and _readable(self.path / "posterior.nc")
 
     def demand_writable(self) -> None:
         """Raise ``InputError`` where the folder cannot be written, or not be made."""
@@ -87,6 +87,20 @@ class RunFolder:
         write_csv(bands, self.path / "bands.csv")
         write_posterior(calibration, self.path / "posterior.nc")
         write_json(describe(calibration, self.digest), self.path / "run.json")
+
+
+def _readable(posterior: Path) -> bool:
+    """Whether every array of the file can be read."""
+    import h5netcdf
+
+    try:
+        with h5netcdf.File(posterior, "r") as file:
+            for group in file.groups.values():
+                for variable in group.variables.values():
+                    _ = variable[...]
+    except (OSError, RuntimeError, ValueError, KeyError):
+        return False
+    return True
 
 
 def describe(calibration: Calibration, digest: str) -> dict[str, Any]:
@@ -177,8 +191,9 @@ def load_run(path: Path) -> StoredRun:
         data = az.from_netcdf(str(path / "posterior.nc"), engine="h5netcdf")
         stored = data["sampler_coordinates"]
         u, eta = stored["coordinates"].to_numpy(), stored["linear_coordinates"].to_numpy()
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(path / "posterior.nc", "no posterior", "the file that calibrate wrote") from error
+    except (OSError, RuntimeError, ValueError, KeyError) as error:
+        found = "a damaged file" if (path / "posterior.nc").is_file() else "no such file"
+        raise InputError(path / "posterior.nc", found, "the draws that calibrate wrote") from error
     model = build_model(blueprint)
     u, eta, chains = u.reshape(-1, u.shape[-1]), eta.reshape(-1, eta.shape[-1]), u.shape[0]
     return StoredRun(path, model, Draws(u, model.values(u), eta, chains), state)

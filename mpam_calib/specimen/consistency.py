@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import E_REL_SD, Declaration, Simulation
@@ -16,9 +18,10 @@ LEAST_LEVELS = {"linear": 2, "exponential": 3, "exponential_each": 3}
 def normalised_simulation(source: TomlSource, declaration: Declaration) -> Simulation:
     """The simulation with what follows from its moduli filled in.
 
-    Declared ``E_Pa`` fix the order, the law (constant) and the strain (engineering). A tensile
-    test says nothing of pressure: its law is constant. Raises ``InputError`` where the moduli are
-    given twice or not at all, or an effect or friction lacks its braid.
+    Declared ``E_Pa`` fix the order, the law (constant) and the strain (engineering); another run's
+    moduli the order and the strain that they were found with. A tensile test says nothing of pressure:
+    its law is constant. Raises ``InputError`` where the moduli are given twice or not at all, another
+    run's do not fit, or an effect or friction lacks its braid.
     """
     simulation = declaration.simulation
     tensile = bool(declaration.files.of("tensile"))
@@ -26,6 +29,8 @@ def normalised_simulation(source: TomlSource, declaration: Declaration) -> Simul
     _check_braid(source, declaration)
     if tensile and not declaration.files.muscle and declaration.geometry is None:
         return simulation.model_copy(update={"moduli": "tensile", "law": "constant", "friction": "none"})
+    if simulation.moduli.startswith("run:"):
+        return _as_in_run(source, simulation)
     if simulation.moduli != "tensile":
         return simulation
     if simulation.E_Pa is None:
@@ -36,7 +41,7 @@ def normalised_simulation(source: TomlSource, declaration: Declaration) -> Simul
 
 
 def check_parts(source: TomlSource, declaration: Declaration, *, data_required: bool) -> None:
-    """Refuse a declaration without data, muscle data without a geometry, or a run that is not there."""
+    """Refuse a declaration without data, or muscle data without a geometry."""
     simulation = declaration.simulation
     muscle = bool(declaration.files.muscle)
     nothing = not muscle and not declaration.files.of("tensile")
@@ -45,10 +50,6 @@ def check_parts(source: TomlSource, declaration: Declaration, *, data_required: 
     if declaration.geometry is None and (muscle or nothing):
         expected = "L0_mm, R0_mm, t0_mm and alpha0_deg of the muscle"
         raise fault(source, ["geometry"], "no table [geometry]", expected)
-    if simulation.moduli.startswith("run:") and not material_run(source.file.parent, simulation).is_dir():
-        keys = ["simulation", "moduli"]
-        found = f'"{simulation.moduli}", which is not there'
-        raise fault(source, keys, found, "the folder of a finished run")
     strain = declaration.fit.tensile_strain
     if strain is not None and not declaration.files.of("tensile"):
         keys = ["fit", "tensile_strain"]
@@ -58,6 +59,31 @@ def check_parts(source: TomlSource, declaration: Declaration, *, data_required: 
 def material_run(folder: Path, simulation: Simulation) -> Path:
     """Folder of the run that ``moduli = "run:PATH"`` names, relative to the specimen's folder."""
     return folder / simulation.moduli.removeprefix("run:").strip()
+
+
+def _as_in_run(source: TomlSource, simulation: Simulation) -> Simulation:
+    """The simulation with the order and strain of the run that its moduli come from."""
+    keys = ["simulation", "moduli"]
+    folder = material_run(source.file.parent, simulation)
+    if not folder.is_dir():
+        found = f'"{simulation.moduli}", which is not there'
+        raise fault(source, keys, found, "the folder of a finished run")
+    try:
+        record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        run: dict[str, Any] = record["blueprint"]["simulation"]
+        own = {"order": int(run["order"]), "strain": str(run["strain"]), "law": str(run["law"])}
+    except (OSError, ValueError, KeyError, TypeError):
+        found = f'"{simulation.moduli}", a folder without a readable run.json'
+        raise fault(source, keys, found, "the folder of a finished run") from None
+    if own["law"] != "constant":
+        found = f'"{simulation.moduli}", whose moduli depend on pressure (law "{own["law"]}")'
+        raise fault(source, keys, found, "a run with a constant law")
+    stated = source.tables.get("simulation", {})
+    for name in ("order", "strain"):
+        if name in stated and getattr(simulation, name) != own[name]:
+            expected = f'{own[name]} as in "{simulation.moduli}", or no {name} here'
+            raise fault(source, ["simulation", name], f"{getattr(simulation, name)}", expected)
+    return simulation.model_copy(update=own)
 
 
 def check_levels(source: TomlSource, simulation: Simulation, levels: int) -> None:

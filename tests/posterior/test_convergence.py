@@ -46,6 +46,15 @@ def test_ess_is_never_flattered_by_anticorrelation():
     assert diagnose_chains(ar1(-0.5, 2)).ess_bulk[0] <= np.prod(SHAPE)
 
 
+def test_chains_too_short_to_tell_are_worth_a_draw_each():
+    free = np.random.default_rng(0).standard_normal((4, 10, 400, 2))
+    assert np.all(diagnose_chains(free).ess_bulk > 400.0)
+    for steps in (1, 2, 3, 4, 9):
+        found = diagnose_chains(free[:, :steps])
+        assert np.all(found.ess_bulk == 4.0) and np.all(found.ess_tail == 4.0)
+        assert not found.meets(400.0)
+
+
 def test_tail_ess_sees_tails_that_do_not_mix():
     """The sign of a series flips freely, its size hardly: the bulk is fine, the tails are not."""
     size = np.exp(1.5 * ar1(0.995, 3))

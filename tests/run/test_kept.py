@@ -53,6 +53,31 @@ def test_a_smaller_budget_keeps_what_has_converged(own_material: Path, own_run: 
     assert stamps(own_run) == before
 
 
+@pytest.mark.parametrize("steps", [1, 3])
+def test_chains_too_short_to_tell_have_not_converged(
+    steps: int, own_material: Path, tmp_path: Path, here: Here
+) -> None:
+    assert here("calibrate", own_material, "-o", tmp_path / "run", "--max-steps", steps).code == 3
+    assert state(tmp_path / "run")["converged"] is False
+
+
+def test_a_damaged_posterior_is_drawn_again(
+    own_material: Path, own_run: Path, material_run: Path, here: Here
+) -> None:
+    posterior = own_run / "posterior.nc"
+    whole = posterior.read_bytes()
+    for spoilt in (whole[: len(whole) // 2], b"", b"\0" * len(whole)):
+        posterior.write_bytes(spoilt)
+        refused = here("predict", own_run)
+        assert refused.code == 2
+        assert refused.complaint.startswith(f"error: {posterior}: found a damaged file, expected the draws")
+    result = here("calibrate", own_material, "-o", own_run)
+    assert result.code == 0 and "kept" not in result.out
+    for name in ("summary.csv", "bands.csv", "run.json"):
+        assert (own_run / name).read_bytes() == (material_run / name).read_bytes()
+    assert "kept" in here("calibrate", own_material, "-o", own_run).out
+
+
 @pytest.mark.parametrize("change", ["seed", "data", "model"])
 def test_another_digest_replaces(change: str, own_material: Path, own_run: Path, here: Here) -> None:
     before = contents(own_run)

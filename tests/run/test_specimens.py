@@ -9,6 +9,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from mpam_calib.specimen import read
+
 from .command import FAST, RESULTS, Here, contents
 from .small import (
     LEVELS,
@@ -145,6 +147,21 @@ def test_a_materials_run_gives_a_muscle_its_moduli(
         assert abs(found.loc[name, "mean"] - value) < 4.0 * found.loc[name, "sd"]
     assert len(json.loads((run / "run.json").read_text())["blueprint"]["material"]["mean"]) == 2
     assert "tensile test" in (run / "report.html").read_text()
+
+    # The run knows its own order and strain; the muscle may say the same or nothing.
+    declaration = folder / "specimen.toml"
+    told = declaration.read_text()
+    declaration.write_text(told.replace("order = 2\n", ""))
+    silent = read(folder).simulation
+    assert (silent.order, silent.strain, silent.law) == (2, "engineering", "constant")
+    for old, new in (("order = 2", "order = 3"), ('strain = "engineering"', 'strain = "stretch"')):
+        changed = told.replace(old, new) if old in told else f"{told}{new}\n"
+        declaration.write_text(changed)
+        refused = here("check", folder)
+        assert refused.code == 2
+        assert f"simulation.{new.split()[0]}: found" in refused.complaint
+        assert 'as in "run:../material_run"' in refused.complaint
+    declaration.write_text(told)
 
     # Another test of the material makes the muscle's run another one.
     assert "kept" in here("calibrate", folder, "-o", run, *BARE).out
