@@ -31,6 +31,15 @@ class Points:
     def __len__(self) -> int:
         return len(self.force)
 
+    def level(self, levels: Array) -> NDArray[np.int64]:
+        """The level (n,) of each point: its own, or of those (Pa) the nearest."""
+        nearest = np.abs(self.readings.pressure[:, None] - levels).argmin(axis=1)
+        return np.where(self.readings.level >= 0, self.readings.level, nearest)
+
+    def take(self, rows: NDArray[np.bool_]) -> Points:
+        """Some of the points."""
+        return Points(self.readings.take(rows), self.force[rows], self.censored[rows], self.kind[rows])
+
 
 KINDS = ("force_map", "blocked_force", "free_contraction")
 

@@ -12,12 +12,12 @@ from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, WHITE
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import ROUGH, SMOOTH
-from mpam_calib.posterior.bins import bin_loops
+from mpam_calib.posterior.bins import LoopBins, bin_loops
 from mpam_calib.posterior.collapsed import Collapsed, Data, Guide
 from mpam_calib.posterior.mode import Mode, climb_modes, find_modes
 from mpam_calib.posterior.points import gather_points, gather_tensile
 from mpam_calib.posterior.sites import LEAST_SHARE
-from mpam_calib.specimen.recording import Specimen
+from mpam_calib.specimen.recording import Loops, Specimen
 
 Array = NDArray[np.float64]
 
@@ -50,6 +50,36 @@ def build_target(specimen: Specimen, blueprint: Blueprint) -> Collapsed:
         floor=0.0 if floor is None else floor,
     )
     return Collapsed(model, data, _measured(data))
+
+
+def without_level(specimen: Specimen, target: Collapsed, level: int) -> Collapsed:
+    """The target without what was recorded at one level, but for the motion; ``level`` indexes the levels.
+
+    Guide forces are those of the whole target.
+    """
+    data, guide = target.data, target.guide
+    bins, points = data.bins, data.points
+    if specimen.loops is not None and bins is not None:
+        there = bins.readings.level != level
+        bins = _bins_without(specimen.loops, level)
+        if bins is not None and 2 * len(bins) == int(there.sum()):
+            noise = None if guide.bin_noise is None else guide.bin_noise[there[: len(there) // 2]]
+            guide = replace(guide, bins=None if guide.bins is None else guide.bins[there], bin_noise=noise)
+        else:
+            guide = replace(guide, bins=_measured(replace(data, bins=bins)).bins, bin_noise=None)
+    if points is not None:
+        kept = points.level(specimen.levels_Pa) != level
+        points = points.take(kept) if kept.any() else None
+        at = {name: getattr(guide, name) for name in ("points", "slope", "point_noise")}
+        guide = replace(guide, **{name: None if x is None else x[kept] for name, x in at.items()})
+    return replace(target, data=replace(data, bins=bins, points=points), guide=guide)
+
+
+def _bins_without(loops: Loops, level: int) -> LoopBins | None:
+    out = loops.level == level
+    if out.all():
+        return None
+    return bin_loops(replace(loops, unclear=out if loops.unclear is None else out | loops.unclear))
 
 
 def _measured(data: Data) -> Guide:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import pandas as pd
 from markupsafe import Markup
 
 from mpam_calib.report import wording
 from mpam_calib.report.figures import corner, loops, pressure, priors, residuals
-from mpam_calib.report.numbers import decimals, fixed, with_band
+from mpam_calib.report.numbers import decimals, fixed, significant, with_band
 from mpam_calib.report.page import (
     Block,
     DataTable,
@@ -22,7 +24,7 @@ from mpam_calib.report.page import (
 )
 from mpam_calib.report.parameters import RIGHT, learnt_table, summary_table
 from mpam_calib.report.spoken import spoken
-from mpam_calib.report.trust import assess, covered
+from mpam_calib.report.trust import assess, held_between
 from mpam_calib.report.view import CalibrationView
 
 LONG_TABLE = 12
@@ -60,26 +62,23 @@ def _lead(view: CalibrationView) -> list[Block]:
         parts.append(Markup("shortens by ") + spoken(value, band, "%", " of its length without load"))
         note = f"at {top:g} kPa, of the length at rest"
         cards.append(KeyNumber("Free contraction", value, "%", f"90 % band: {band} %", note))
-    cards.append(_fit_card(view, "N"))
+    cards += _fit_cards(view)
     sentence = Markup("At {} kPa, {} {}.").format(f"{top:g}", view.name, Markup(" and ").join(parts))
     return [Headline(sentence), Numbers(cards), assess(view)]
 
 
-def _fit_card(view: CalibrationView, unit: str) -> KeyNumber:
-    share = covered(view)
-    inside = "" if share is None else f"{100 * share:.0f} % of the readings lie inside their 90 % band"
-    if view.remainder != view.remainder:
-        return KeyNumber(
-            "Readings inside their band",
-            "–" if share is None else f"{100 * share:.0f}",
-            "%",
-            "should be 90 %",
-        )
-    size = view.remainder
-    noise = (
-        f"sensor noise: {fixed(view.noise, decimals(view.noise))} {unit}" if view.noise == view.noise else ""
-    )
-    return KeyNumber("Simulation misses by", fixed(size, decimals(size)), unit, noise, inside)
+def _fit_cards(view: CalibrationView) -> list[KeyNumber]:
+    """What the simulation misses, and whether levels left out are foreseen, where these were assessed."""
+    share = held_between(view)
+    held = "" if share is None else f"levels left out: {100 * share:.0f} % of readings in their 90 % band"
+    if math.isfinite(view.remainder):
+        size, noise = (fixed(x, decimals(x)) for x in (view.remainder, view.noise))
+        words = f"sensor noise: {noise} N" if math.isfinite(view.noise) else ""
+        return [KeyNumber("Simulation misses by", size, "N", words, held)]
+    if share is None:
+        return []
+    text = f"{100 * share:.0f}"
+    return [KeyNumber("Levels left out", text, "%", "of readings in their 90 % band", "should be 90 %")]
 
 
 def _band(row: pd.Series, scale: float = 1.0) -> tuple[str, str]:
@@ -111,6 +110,8 @@ def _sections(view: CalibrationView) -> list[Section]:
     if not view.readings("loops", "force_map").empty:
         found.append(_residual_section(view))
     found.append(_pressure_section(view))
+    if not view.left_out.empty:
+        found.append(_left_out_section(view))
     return found
 
 
@@ -151,6 +152,29 @@ def _pressure_section(view: CalibrationView) -> Section:
             ),
             DataTable(levels, "Mean and 90 % band at each level", right, collapse=len(levels) > LONG_TABLE),
         ],
+    )
+
+
+def _left_out_section(view: CalibrationView) -> Section:
+    beyond = {True: " (beyond the others)", False: ""}
+    rows = [
+        {
+            "level (kPa)": f"{row['pressure_kPa']:g}{beyond[bool(row['extrapolated'])]}",
+            "in their 90 % band": f"{100 * row['inside90']:.0f} %",
+            "missed by (N, rms)": significant(row["rmse_N"], 2),
+            "mean miss (N)": f"{significant(row['bias_N'], 2)} ± {significant(row['bias_sd_N'], 1)}",
+        }
+        for row in view.left_out.to_dict("records")
+    ]
+    table = pd.DataFrame(rows)
+    caption = (
+        "Readings of a level that the fit has not seen; ±: one sigma that the prediction gives its own mean"
+    )
+    return Section(
+        "Each level predicted from the others",
+        [DataTable(table, caption, dict.fromkeys(table.columns, "{}"), collapse=len(table) > LONG_TABLE)],
+        "What happens at a pressure that was not recorded: far fewer than 90 % means that the simulation's "
+        "dependence on pressure is wrong, and its bands hold at the recorded pressures only.",
     )
 
 

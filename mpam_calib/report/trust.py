@@ -23,10 +23,8 @@ REMAINDER_BAD: Final = 0.10
 WIDE_CAUTION: Final = 0.10
 WIDE_BAD: Final = 0.30
 """Half of the 90 % band over the value."""
-COVERAGE_CAUTION: Final = 0.80
-COVERAGE_BAD: Final = 0.60
-"""Share of the readings inside bands that should hold 90 % of them."""
-COVERAGE_MIN_ROWS: Final = 20
+HELD: Final = 0.80
+"""Least share of a level's readings, predicted from other levels, in bands that should hold 90 %."""
 UNIDENTIFIED: Final = 0.20
 """A posterior that is narrower than its prior by less than this share learnt nothing."""
 GAUGE_SHARE: Final = 0.5
@@ -128,14 +126,28 @@ def extrapolation(view: CalibrationView) -> Limit | None:
     return Limit("caution", sentence, f"the {' and the '.join(names)} {verb} extrapolated")
 
 
-def coverage(view: CalibrationView) -> Limit | None:
-    """The bands do not hold the share of readings that they promise."""
-    share = covered(view)
-    if share is None or share >= COVERAGE_CAUTION:
+def between_levels(view: CalibrationView) -> Limit | None:
+    """The inner levels, predicted from the others, miss their readings: so it is anywhere between levels."""
+    share = held_between(view)
+    if share is None or share >= HELD:
         return None
-    level: Level = "bad" if share < COVERAGE_BAD else "caution"
-    sentence = f"Only {100 * share:.0f} % of the readings lie inside bands that should hold 90 % of them."
-    return Limit(level, sentence, "the bands are too narrow for the data")
+    sentence = (
+        "Use these numbers at the recorded pressures only: a level between others, predicted from them, has "
+        f"{100 * share:.0f} % of its readings inside bands that should hold 90 % of them."
+    )
+    return Limit("caution", sentence, "between the recorded pressures the bands are too narrow")
+
+
+def beyond_levels(view: CalibrationView) -> Limit | None:
+    """The outer levels, predicted from the others, miss their readings."""
+    share = _held(view, extrapolated=True)
+    if share is None or share >= HELD:
+        return None
+    sentence = (
+        "Do not extrapolate in pressure: the lowest and the highest level, predicted from the others, have "
+        f"{100 * share:.0f} % of their readings inside bands that should hold 90 % of them."
+    )
+    return Limit("good", sentence, "beyond the recorded pressures the bands are too narrow")
 
 
 def gauge(view: CalibrationView) -> Limit | None:
@@ -203,7 +215,12 @@ class Check:
 
 CHECKS: tuple[Check, ...] = (
     Check(convergence, "the sampler has settled"),
-    Check(coverage, "the bands hold the readings that they should", lambda view: covered(view) is not None),
+    Check(
+        between_levels,
+        "each level lies in the bands that the others give",
+        lambda view: held_between(view) is not None,
+    ),
+    Check(beyond_levels),
     Check(
         remainder,
         "the simulation fits to within the noise or half a per cent",
@@ -264,13 +281,17 @@ def headline_bands(view: CalibrationView) -> list[tuple[str, float, float, float
     return [(words, float(row["mean"]), float(row["q05"]), float(row["q95"])) for words, row in chosen]
 
 
-def covered(view: CalibrationView) -> float | None:
-    """Share of uncensored force readings within 90 % of their predictive sd; None if there are few."""
-    rows = view.readings("loops", "force_map", "blocked_force", "tensile")
-    rows = rows[~rows["censored"].fillna(False).astype(bool)]
-    z = (rows["force_N"] - rows["fitted_N"]).abs() / rows["sd_N"]
-    z = z[z.notna()]
-    return float((z <= Z90).mean()) if len(z) >= COVERAGE_MIN_ROWS else None
+def held_between(view: CalibrationView) -> float | None:
+    """Share of the inner levels' readings in the 90 % bands that the other levels give; None without any."""
+    return _held(view, extrapolated=False)
+
+
+def _held(view: CalibrationView, extrapolated: bool) -> float | None:
+    rows = view.left_out
+    if rows.empty:
+        return None
+    rows = rows[rows["extrapolated"].astype(bool) == extrapolated]
+    return float(rows["inside90"].mean()) if len(rows) else None
 
 
 def unidentified_names(view: CalibrationView) -> list[str]:

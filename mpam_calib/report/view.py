@@ -75,7 +75,8 @@ class CalibrationView:
     ``headline`` (at most eight are shown). ``remainder`` is the root mean square of what the
     simulation leaves out and ``noise`` one sigma of the sensor, both in N (Pa for a tensile test);
     nan where not assessed. ``unidentified`` has ``parameter, prior_sd, posterior_sd, contraction``
-    (1 − posterior sd / prior sd) ``, sentence``.
+    (1 − posterior sd / prior sd) ``, sentence``. ``left_out`` has a row for each level that was predicted
+    from the others: ``pressure_kPa, readings, rmse_N, bias_N, bias_sd_N, inside90, extrapolated``.
 
     ``strain_range`` (tensile) has one row per range and quantity: ``strain_low, strain_high, used,
     quantity, unit, mean, q05, q95``, where a quantity is a modulus or a prediction. ``provenance``
@@ -94,6 +95,7 @@ class CalibrationView:
     prior_draws: Mapping[str, Floats] = field(default_factory=dict)
     headline: Sequence[str] = ()
     unidentified: pd.DataFrame = field(default_factory=pd.DataFrame)
+    left_out: pd.DataFrame = field(default_factory=pd.DataFrame)
     strain_range: pd.DataFrame = field(default_factory=pd.DataFrame)
     settings: Mapping[str, str] = field(default_factory=dict)
     data_files: pd.DataFrame = field(default_factory=pd.DataFrame)

@@ -15,6 +15,7 @@ from mpam_calib.model.tensile import MISFIT, NOISE
 from mpam_calib.posterior.draws import Draws, prior_draws
 from mpam_calib.posterior.points import KINDS
 from mpam_calib.prediction.bands import stress_draws
+from mpam_calib.prediction.left_out import levels_left_out
 from mpam_calib.report.view import OBSERVED_COLUMNS, CalibrationView, Convergence
 from mpam_calib.run.folder import versions
 from mpam_calib.run.strain_range import strain_range_table
@@ -67,6 +68,7 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
         prior_draws=prior_draws(model, headline, calibration.seed),
         headline=headline,
         unidentified=_learnt(summary),
+        left_out=levels_left_out(specimen, calibration.target, calibration.draws, calibration.seed),
         strain_range=strain_range_table(calibration) if model.setting is None else pd.DataFrame(),
         settings=_settings(calibration),
         data_files=pd.DataFrame(

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mpam_calib.prediction.left_out import COLUMNS
 from mpam_calib.report.calibration import calibration_page
 from mpam_calib.report.figures import corner, density, residuals
 from mpam_calib.report.numbers import with_band
@@ -148,9 +149,21 @@ def test_static_map_without_branches_and_without_draws(view: CalibrationView) ->
         remainder=float("nan"), noise=float("nan"),
     )  # fmt: skip
     words = words_of(calibration_page(bare).render())
-    assert "Readings inside their band" in words
+    assert "Simulation misses by" not in words and "Levels left out" not in words
     assert "Blue: loading" not in words
     assert "Which parameters trade off" not in words
+
+
+def test_levels_predicted_from_the_others(view: CalibrationView) -> None:
+    left_out = pd.DataFrame(
+        [[50.0, 200, 2.0, 1.5, 0.2, 0.31, True], [100.0, 200, 1.0, -0.5, 0.1, 0.86, False]],
+        columns=COLUMNS,
+    )
+    for remainder, heading in ((0.24, "Simulation misses by"), (np.nan, "Levels left out")):
+        shown = replace(view, left_out=left_out, remainder=remainder)
+        words = words_of(calibration_page(shown).render())
+        assert heading in words and "Each level predicted from the others" in words
+        assert "86 %" in words and "50 (beyond the others)" in words and "1.5 ± 0.2" in words
 
 
 def test_constant_and_broken_draws_do_not_stop_the_page(view: CalibrationView) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pandas as pd
 import pytest
 
 from mpam_calib.report import trust
@@ -116,17 +117,32 @@ def test_extrapolation_at_the_top_level_only(sound: CalibrationView) -> None:
     assert "free contraction at 250 kPa" in limit.sentence
 
 
-@pytest.mark.parametrize(("factor", "level"), [(1.0, None), (0.5, "caution"), (0.2, "bad")])
-def test_bands_that_miss_the_readings(sound: CalibrationView, factor: float, level: str | None) -> None:
-    limit = trust.coverage(
-        replace(sound, observed=sound.observed.assign(sd_N=factor * sound.observed["sd_N"]))
-    )
-    assert (limit.level if limit else None) == level
+@pytest.mark.parametrize(
+    ("inside", "between", "beyond"),
+    [
+        ((0.9, 0.9, 0.9, 0.9), None, None),
+        ((0.2, 0.9, 0.9, 0.9), None, "good"),
+        ((0.9, 0.9, 0.5, 0.9), "caution", None),
+        ((0.0, 0.1, 0.0, 0.1), "caution", "good"),
+    ],
+)
+def test_levels_that_the_others_do_not_foresee(
+    sound: CalibrationView, inside: tuple[float, ...], between: str | None, beyond: str | None
+) -> None:
+    left_out = pd.DataFrame({"inside90": inside, "extrapolated": [True, False, False, True]})
+    view = replace(sound, left_out=left_out)
+    limits = (trust.between_levels(view), trust.beyond_levels(view))
+    assert tuple(limit.level if limit else None for limit in limits) == (between, beyond)
+    if limits[0]:
+        assert f"{100 * (inside[1] + inside[2]) / 2:.0f} % of its readings" in limits[0].sentence
 
 
-def test_coverage_needs_readings(sound: CalibrationView) -> None:
-    assert trust.covered(replace(sound, observed=sound.observed.head(10))) is None
-    assert trust.covered(replace(sound, observed=sound.observed.assign(censored=True))) is None
+def test_levels_that_could_not_be_left_out_are_no_good_news(sound: CalibrationView) -> None:
+    told = ("each level lies", "recorded pressures")
+    assert not any(words in reason for reason in trust.assess(sound).reasons for words in told)
+    left_out = pd.DataFrame({"inside90": [0.9] * 3, "extrapolated": [True, False, True]})
+    reasons = trust.assess(replace(sound, left_out=left_out)).reasons
+    assert "each level lies in the bands that the others give" in reasons[-1]
 
 
 def test_a_gauge_that_makes_up_the_band_is_named(sound: CalibrationView) -> None:

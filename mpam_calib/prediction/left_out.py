@@ -1,0 +1,141 @@
+"""Each pressure level predicted from all the others: what the bands are worth where no loop was recorded.
+
+The posterior without a level is the whole one reweighted by one over what that level added to the
+likelihood, its weights smoothed (Vehtari, Simpson, Gelman, Yao and Gabry 2024, Pareto smoothed importance
+sampling, https://jmlr.org/papers/v25/19-556.html); where few draws would carry it, it is found anew from its
+mode. Moduli and remainder are drawn from their exact distribution given the other levels in either case.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpam_calib.model.readings import Readings
+from mpam_calib.model.remainder import ROUGH
+from mpam_calib.posterior.batch import batch_size
+from mpam_calib.posterior.collapsed import Collapsed
+from mpam_calib.posterior.draws import Draws
+from mpam_calib.posterior.mode import climb_modes, evaluate
+from mpam_calib.posterior.points import KINDS
+from mpam_calib.posterior.row_motion import row_readings
+from mpam_calib.posterior.target import predict_force, without_level
+from mpam_calib.posterior.warmup import laplace_mixture
+from mpam_calib.prediction.reading_noise import ReadingNoise
+from mpam_calib.specimen.recording import Specimen
+from mpam_calib.units import KPA
+
+Array = NDArray[np.float64]
+
+COLUMNS = ["pressure_kPa", "readings", "rmse_N", "bias_N", "bias_sd_N", "inside90", "extrapolated"]
+FEWEST, MOST = 3, 8
+"""Levels from which one can be left out, and how many are."""
+READINGS = 200
+"""Readings of a level that are predicted."""
+DRAWS, PROPOSED = 400, 2000
+RELIABLE = 0.7
+"""Pareto's k up to which reweighted draws are believed."""
+
+
+@dataclass(frozen=True)
+class _Held:
+    """Readings (n,) of one level, and their forces (N)."""
+
+    places: Readings
+    force: Array
+
+
+def levels_left_out(specimen: Specimen, target: Collapsed, draws: Draws, seed: int) -> pd.DataFrame:
+    """A row of COLUMNS for each level, the lowest and the highest extrapolated.
+
+    ``inside90``: share of the level's readings inside the 90 % band that all other levels give a new reading
+    there; ``bias_N`` their mean above the prediction, ``bias_sd_N`` the sd that the prediction gives it, one
+    reading's noise left out. Empty where there are fewer than FEWEST levels, or moduli of each level's own.
+    """
+    levels = specimen.levels_Pa
+    if target.model.setting is None or len(levels) < FEWEST or specimen.simulation.law == "free":
+        return pd.DataFrame(columns=COLUMNS)
+    thinned = draws.thin(DRAWS)
+    whole = _likelihood(target, thinned)
+    rows = []
+    for level in np.unique(np.linspace(0, len(levels) - 1, MOST).round().astype(np.int64)):
+        held = _held(specimen, target, int(level))
+        if held is None:
+            continue
+        fold = without_level(specimen, target, int(level))
+        rng = np.random.default_rng([seed, 11, int(level)])
+        force, seen = _predict(fold, _reweighted(fold, thinned, whole, rng), held.places, rng)
+        low, high = np.quantile(seen, [0.05, 0.95], axis=0)
+        miss = held.force - force.mean(axis=0)
+        rows.append(
+            [
+                round(float(levels[level]) / KPA, 3), len(miss), float(np.sqrt(np.mean(miss**2))),
+                float(miss.mean()), float(force.mean(axis=1).std()),
+                float(np.mean((held.force >= low) & (held.force <= high))),
+                bool(level in (0, len(levels) - 1)),
+            ]
+        )  # fmt: skip
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _held(specimen: Specimen, target: Collapsed, level: int) -> _Held | None:
+    """The level's readings that are not slack, evenly thinned; None without any."""
+    places: list[Readings] = []
+    force: list[Array] = []
+    if (loops := specimen.loops) is not None:
+        kept = (loops.level == level) & ~loops.censored
+        if loops.unclear is not None:
+            kept &= ~loops.unclear
+        index = np.flatnonzero(kept)
+        places.append(row_readings(loops).take(index))
+        force.append(loops.force_N[index])
+    if (points := target.data.points) is not None:
+        kept = (points.level(specimen.levels_Pa) == level) & ~points.censored
+        index = np.flatnonzero(kept & (points.kind != KINDS.index("free_contraction")))
+        places.append(points.readings.take(index))
+        force.append(points.force[index])
+    everything, value = Readings.join(places), np.concatenate(force)
+    if not len(value):
+        return None
+    some = np.unique(np.linspace(0, len(value) - 1, READINGS).round().astype(np.int64))
+    return _Held(everything.take(some), value[some])
+
+
+def _likelihood(target: Collapsed, draws: Draws) -> Array:
+    """Log likelihood (N,) of the draws' sampled coordinates."""
+    size = batch_size(target)
+    parts = (draws.u[i : i + size] for i in range(0, len(draws), size))
+    return np.concatenate([target.log_likelihood(target.model.values(u)) for u in parts])
+
+
+def _reweighted(fold: Collapsed, draws: Draws, whole: Array, rng: np.random.Generator) -> Array:
+    """Coordinates (N, d) drawn from the posterior without the level."""
+    import arviz as az
+
+    ratio = _likelihood(fold, draws) - whole
+    weight, shape = az.psislw(np.where(np.isfinite(ratio), ratio, -np.inf))
+    if float(shape) <= RELIABLE:
+        return draws.u[rng.choice(len(draws), len(draws), p=np.exp(weight))]
+    start = draws.u[int(np.argmax(ratio))]
+    mixture = laplace_mixture(climb_modes(fold, [start, draws.u.mean(axis=0)]))
+    proposed = mixture.draw(PROPOSED, np.random.RandomState(int(rng.integers(2**31))))
+    ratio = evaluate(fold, proposed) - mixture.log_density(proposed)
+    weight, _ = az.psislw(ratio)
+    return proposed[rng.choice(PROPOSED, len(draws), p=np.exp(weight))]
+
+
+def _predict(fold: Collapsed, u: Array, places: Readings, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Force (N, n) with all that the simulation may miss, and readings of it."""
+    model, size = fold.model, batch_size(fold)
+    assert model.setting is not None
+    values = model.values(u)
+    eta = np.concatenate(
+        [fold.linear_draws(model.values(u[i : i + size]), rng) for i in range(0, len(u), size)]
+    )
+    force = predict_force(model, values, eta, places)
+    if ROUGH in values:
+        force = force + values[ROUGH] * rng.standard_normal(force.shape)
+    return force, force + ReadingNoise(values, model.setting.force_scale).draw(force, rng)

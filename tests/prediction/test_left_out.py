@@ -1,0 +1,79 @@
+"""What is said of levels left out: quiet where the simulation is true, loud where its law is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from model import build
+
+from mpam_calib.calibration import Calibration, calibrate
+from mpam_calib.model.blueprint import Options
+from mpam_calib.posterior.target import predict_force
+from mpam_calib.prediction.left_out import COLUMNS, levels_left_out
+from mpam_calib.specimen.recording import Specimen
+
+from .coverage import as_specimen, posterior_draws, rig_case
+
+WITHOUT = Options(remainder=False)
+
+
+def specimen_of(seed: int) -> Specimen:
+    muscle, rows, _, reading, protocol = rig_case(seed)
+    return as_specimen(muscle, rows, reading, protocol)
+
+
+def told(calibration: Calibration):
+    return levels_left_out(calibration.specimen, calibration.target, calibration.draws, calibration.seed)
+
+
+@pytest.fixture(scope="module")
+def sound() -> Calibration:
+    return calibrate(specimen_of(0))
+
+
+def test_levels_of_a_true_simulation_are_foreseen(sound):
+    table = told(sound)
+    assert list(table.columns) == COLUMNS
+    assert table["extrapolated"].tolist() == [True, *[False] * 5, True]
+    assert abs(table["inside90"].mean() - 0.90) < 0.05
+    assert (np.abs(table["bias_N"]) < 4.0 * (table["bias_sd_N"] + 0.2 * table["rmse_N"])).all()
+    assert told(sound).equals(table)
+
+
+def test_reweighting_and_refitting_say_the_same(sound):
+    """The level that was least like the others, against a posterior drawn without it."""
+    specimen = sound.specimen
+    table = told(sound)
+    for level in (0, 3):
+        kept = [j for j in range(len(specimen.levels_Pa)) if j != level]
+        model, draws = posterior_draws(build.take_levels(specimen, kept), specimen, Options(), 1, False)
+        mask = specimen.loops.level == level
+        places = build.rows_of(specimen.loops).take(mask)
+        force = predict_force(model, draws.values, draws.eta, places)
+        bias = float(np.mean(specimen.loops.force_N[mask] - force.mean(axis=0)))
+        spread = float(force.mean(axis=1).std())
+        row = table.iloc[level]
+        assert row["bias_N"] == pytest.approx(bias, abs=0.35 * spread)
+        assert row["bias_sd_N"] == pytest.approx(spread, rel=0.3)
+
+
+def test_a_law_that_is_wrong_in_pressure_is_told_though_every_level_fits():
+    """Forces off by an eighth of a wave from level to level: the moduli follow each level, not the next."""
+    specimen = specimen_of(1)
+    loops = specimen.loops
+    zigzag = 0.03 * loops.force_N.max() * (-1.0) ** loops.level
+    wrong = replace(specimen, loops=replace(loops, force_N=loops.force_N + zigzag))
+    table = told(calibrate(wrong, options=Options()))
+    inner = table[~table["extrapolated"]]
+    assert inner["inside90"].mean() < 0.5
+    assert (np.sign(inner["bias_N"]) == (-1.0) ** np.arange(1, 6)).all()
+
+
+def test_nothing_to_leave_out(sound):
+    specimen = sound.specimen
+    free = replace(specimen, simulation=specimen.simulation.model_copy(update={"law": "free"}))
+    two = replace(specimen, levels_Pa=specimen.levels_Pa[:2])
+    for other in (free, two):
+        assert levels_left_out(other, sound.target, sound.draws, 0).empty
