@@ -21,6 +21,7 @@ def main() -> None:
     global _ctrl_c
     ctrl_c = _ctrl_c = CtrlC()
     signal.signal(signal.SIGINT, ctrl_c)
+    sys.unraisablehook = _unraisable
     try:
         code = _run()
     except (Interrupted, KeyboardInterrupt) as error:
@@ -72,6 +73,12 @@ def stop_where_pressed() -> None:
     """Stop here where Ctrl-C was pressed and got lost: Python drops what is raised inside a finaliser."""
     if _ctrl_c is not None and _ctrl_c.pressed and _ctrl_c.process == os.getpid():
         raise Stopped
+
+
+def _unraisable(lost: sys.UnraisableHookArgs) -> None:
+    """Ctrl-C that Python drops is not worth a traceback: ``stop_where_pressed`` makes up for it."""
+    if not isinstance(lost.exc_value, Stopped):
+        sys.__unraisablehook__(lost)
 
 
 def _run() -> int:

@@ -55,6 +55,8 @@ def calibrate(
                 listener=listener,
             )
     except KeyboardInterrupt as error:
+        if not (output / "checkpoint").is_dir():
+            raise Interrupted("interrupted: nothing was drawn yet") from error
         raise Interrupted("interrupted: what was drawn is kept, the same command goes on from it") from error
     what = "kept (same data, model and options)" if outcome.kept else "written"
     print(f"{output / 'report.html'} {what}")

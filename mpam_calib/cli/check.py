@@ -34,7 +34,7 @@ def check(
 
 def report(specimen: Specimen, console: Console) -> None:
     """Print the summary of ``specimen`` to ``console``."""
-    from mpam_calib.specimen.summary import oddities
+    from mpam_calib.specimen.oddities import oddities
 
     material = f" ({specimen.bladder_material})" if specimen.bladder_material else ""
     console.print(f"{specimen.name}{material}", style="bold", markup=False)

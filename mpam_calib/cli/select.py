@@ -19,13 +19,12 @@ def select(
 ) -> None:
     """Rank orders, laws, frictions, kinematics and strain conventions by evidence and held-out levels."""
     from mpam_calib.cli.progress import stage_progress
+    from mpam_calib.report.selection import selection_sentence, short_name
     from mpam_calib.run.select import select_to_folder
 
     with stage_progress() as tell:
         found = select_to_folder(specimen, output, seed=seed, replicates=replicates, tell=tell)
     best = found.models.iloc[0]
-    print(
-        f"first of {len(found.models)}: {best['kinematics']}, {best['strain']}, order {best['order']}, "
-        f"{best['law']}, {best['friction']} (probability {best['probability']:.3g})"
-    )
+    print(selection_sentence(found.models))
+    print(f"first of {len(found.models)}: {short_name(best)} (probability {best['probability']:.3g})")
     print(f"{output / 'report.html'} written")

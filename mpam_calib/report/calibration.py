@@ -54,16 +54,16 @@ def _lead(view: CalibrationView) -> list[Block]:
         value, band = _band(blocked)
         parts.append(Markup("pulls with ") + spoken(value, band, "N", " when it is held at full length"))
         cards.append(
-            KeyNumber("Blocked force", value, "N", f"90 % band: {band} N", f"at {top:g} kPa, friction-free")
+            KeyNumber("Blocked force", value, "N", f"90 % band: {band} N", f"at {top:.4g} kPa, friction-free")
         )
     free = view.at_level("free_contraction", top)
     if free is not None:
         value, band = _band(free, 100.0)
         parts.append(Markup("shortens by ") + spoken(value, band, "%", " of its length without load"))
-        note = f"at {top:g} kPa, of the length at rest"
+        note = f"at {top:.4g} kPa, of the length at rest"
         cards.append(KeyNumber("Free contraction", value, "%", f"90 % band: {band} %", note))
     cards += _fit_cards(view)
-    sentence = Markup("At {} kPa, {} {}.").format(f"{top:g}", view.name, Markup(" and ").join(parts))
+    sentence = Markup("At {} kPa, {} {}.").format(f"{top:.4g}", view.name, Markup(" and ").join(parts))
     return [Headline(sentence), Numbers(cards), assess(view)]
 
 
@@ -159,7 +159,7 @@ def _left_out_section(view: CalibrationView) -> Section:
     beyond = {True: " (beyond the others)", False: ""}
     rows = [
         {
-            "level (kPa)": f"{row['pressure_kPa']:g}{beyond[bool(row['extrapolated'])]}",
+            "level (kPa)": f"{row['pressure_kPa']:.4g}{beyond[bool(row['extrapolated'])]}",
             "in their 90 % band": f"{100 * row['inside90']:.0f} %",
             "missed by (N, rms)": significant(row["rmse_N"], 2),
             "mean miss (N)": f"{significant(row['bias_N'], 2)} ± {significant(row['bias_sd_N'], 1)}",
@@ -179,7 +179,7 @@ def _left_out_section(view: CalibrationView) -> Section:
 
 
 def _level_row(view: CalibrationView, level: float) -> dict[str, str]:
-    row = {"pressure (kPa)": f"{level:g}"}
+    row = {"pressure (kPa)": f"{level:.4g}"}
     for name, quantity, scale in (
         ("blocked force (N)", "blocked_force_N", 1.0),
         ("free contraction (%)", "free_contraction", 100.0),

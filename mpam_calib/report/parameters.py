@@ -45,25 +45,31 @@ def summary_table(view: CalibrationView, names: list[str] | None = None) -> pd.D
 
 def learnt_table(view: CalibrationView) -> pd.DataFrame:
     """How much narrower than its prior each parameter became, least first."""
+    bands = view.summary.set_index("parameter")[["q05", "q95"]]
     rows = []
     for row in view.unidentified.sort_values("contraction", kind="stable").to_dict("records"):
         learnt = float(row["contraction"])
         sentence = row.get("sentence")
+        q05, q95 = bands.loc[row["parameter"]] if row["parameter"] in bands.index else (1.0, 1.0)
         rows.append(
             {
                 "parameter": row["parameter"],
                 "prior sd": significant(float(row["prior_sd"]), 2),
                 "sd": significant(float(row["posterior_sd"]), 2),
                 "learnt": f"{100 * max(learnt, 0.0):.0f} %",
-                "what that means": sentence if isinstance(sentence, str) and sentence else _sentence(learnt),
+                "what that means": sentence
+                if isinstance(sentence, str) and sentence
+                else _sentence(learnt, q05 < 0.0 < q95),
             }
         )
     return pd.DataFrame(rows)
 
 
-def _sentence(learnt: float) -> str:
+def _sentence(learnt: float, either_sign: bool) -> str:
     if learnt < UNIDENTIFIED:
         return "The data say nothing about it: what you see is the prior."
     if learnt < 0.5:
         return "The data say a little; the prior still matters."
+    if either_sign:
+        return "The data narrow it down, but leave its sign open."
     return "The data determine it."

@@ -19,17 +19,19 @@ def short_name(row: pd.Series) -> str:
     return f"{row['kinematics']}, {row['strain']}, M = {row['order']}, {row['law']}, {row['friction']}"
 
 
+def selection_sentence(models: pd.DataFrame) -> str:
+    """What the data say of the models (best first), or that they cannot tell."""
+    if float(models["probability"].iloc[0]) >= SURE:
+        return f"The data ask for {short_name(models.iloc[0])}."
+    together = models["probability"].cumsum().searchsorted(SURE) + 1
+    return f"The data cannot tell: {together} models share {SURE:.0%} of the probability."
+
+
 def selection_page(found: Selection, specimen: Specimen) -> Page:
     """The page for one selection."""
     models = found.models
     best = models.iloc[0]
-    together = models["probability"].cumsum().searchsorted(SURE) + 1
     sure = float(best["probability"]) >= SURE
-    sentence = (
-        f"The data ask for {short_name(best)}."
-        if sure
-        else f"The data cannot tell: {together} models share {SURE:.0%} of the probability."
-    )
     held = models.dropna(subset=["elpd_held_out"])
     reasons = [f"the best model by evidence has probability {best['probability']:.3g}"]
     if len(held):
@@ -37,7 +39,7 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
         same = "the same model" if winner.name == best.name else short_name(winner)
         reasons.append(f"held-out pressure levels prefer {same}")
     lead: list[Block] = [
-        Headline(sentence),
+        Headline(selection_sentence(models)),
         Verdict("Model selection", "good" if sure else "caution", reasons),
     ]
     lead += [Notice(text) for text in left_aside(specimen, "ranking")]

@@ -119,7 +119,7 @@ def extrapolation(view: CalibrationView) -> Limit | None:
     if not names:
         return None
     sentence = (
-        f"No reading comes near the {' or the '.join(names)} at {view.top_level_kPa:g} kPa: "
+        f"No reading comes near the {' or the '.join(names)} at {view.top_level_kPa:.4g} kPa: "
         "the simulation carries the number there, not the data."
     )
     verb = "is" if len(names) == 1 else "are"

@@ -9,6 +9,7 @@ from mpam_calib.calibration import calibrate
 from mpam_calib.model.blueprint import MaterialPosterior, Options
 from mpam_calib.posterior.convergence import ESS_WANTED
 from mpam_calib.posterior.sampling import BLOCK, MAX_STEPS, Listener, Progress
+from mpam_calib.run.files import demand_folder
 from mpam_calib.run.folder import REPORT, RunFolder, material_of, run_digest
 from mpam_calib.specimen import Specimen, read
 
@@ -56,7 +57,7 @@ def calibrate_to_folder(
         material=None if material is None else material.model_dump(),
     )
     folder = RunFolder(run, digest)
-    folder.demand_writable()
+    demand_folder(run)
     state = folder.state()
     if state is not None and folder.complete():
         used = int(state["sampling"]["steps"])

@@ -9,11 +9,10 @@ from pathlib import Path
 import tomlkit
 
 from mpam_calib.criticism.diagnose import Diagnosis, Tell, describe, diagnose, extended_effects
-from mpam_calib.errors import InputError
 from mpam_calib.posterior.checkpoint import write_atomically
 from mpam_calib.report.diagnosis import diagnosis_page
 from mpam_calib.run.calibrate import resolve_material
-from mpam_calib.run.files import write_json
+from mpam_calib.run.files import demand_folder, write_json
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
 
@@ -21,8 +20,7 @@ from mpam_calib.specimen.recording import Specimen
 def diagnose_to_folder(source: Path, run: Path, *, seed: int = 0, tell: Tell | None = None) -> Diagnosis:
     """Diagnose a specimen into a RUN folder; raises ``InputError`` before anything is written."""
     specimen = read(source)
-    if run.exists() and not run.is_dir():
-        raise InputError(run, "a file", "a folder to write into, or a new name")
+    demand_folder(run)
     found = diagnose(specimen, seed=seed, material=resolve_material(specimen), tell=tell)
     toml = source / "specimen.toml" if source.is_dir() else source
     write_extended(found, specimen, toml, run / "extended")

@@ -1,14 +1,30 @@
-"""Writing tables and JSON so that the same numbers give the same bytes, whole or not at all."""
+"""Where results may go; tables and JSON so that the same numbers give the same bytes, whole or not at all."""
 
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from mpam_calib.errors import InputError
 from mpam_calib.posterior.checkpoint import write_atomically
+from mpam_calib.specimen.toml_source import SPECIMEN_FILE
+
+
+def demand_folder(path: Path) -> None:
+    """Raise ``InputError`` where results cannot be written to a folder, or would mix with a specimen."""
+    if path.exists() and not path.is_dir():
+        raise InputError(path, "a file", "a folder to write into, or a new name")
+    if (path / SPECIMEN_FILE).exists():
+        raise InputError(path, "a specimen's folder", "one of its own for the run")
+    there = next(folder for folder in (path.absolute(), *path.absolute().parents) if folder.exists())
+    if not there.is_dir():
+        raise InputError(there, "a file", "a folder to make the run in")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InputError(there, "a folder that may not be written", "one that may")
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -63,16 +62,6 @@ class RunFolder:
     def complete(self) -> bool:
         """Whether all that a finished calibration leaves is there, and its draws can be read."""
         return all((self.path / name).is_file() for name in WRITTEN) and _readable(self.path / "posterior.nc")
-
-    def demand_writable(self) -> None:
-        """Raise ``InputError`` where the folder cannot be written, or not be made."""
-        if self.path.exists() and not self.path.is_dir():
-            raise InputError(self.path, "a file", "a folder to write into, or a new name")
-        there = next(path for path in (self.path.absolute(), *self.path.absolute().parents) if path.exists())
-        if not there.is_dir():
-            raise InputError(there, "a file", "a folder to make the run in")
-        if not os.access(there, os.W_OK | os.X_OK):
-            raise InputError(there, "a folder that may not be written", "one that may")
 
     def clear(self) -> None:
         """Remove an older run's results, the mark of a finished run first, and what was left half-written."""

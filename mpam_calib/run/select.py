@@ -6,10 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mpam_calib.criticism.select import Selection, select
-from mpam_calib.errors import InputError
 from mpam_calib.report.selection import selection_page
 from mpam_calib.run.calibrate import resolve_material
-from mpam_calib.run.files import write_csv
+from mpam_calib.run.files import demand_folder, write_csv
 from mpam_calib.specimen import read
 
 
@@ -23,8 +22,7 @@ def select_to_folder(
 ) -> Selection:
     """Rank the model space into a RUN folder; raises ``InputError`` before anything is written."""
     specimen = read(source)
-    if run.exists() and not run.is_dir():
-        raise InputError(run, "a file", "a folder to write into, or a new name")
+    demand_folder(run)
     material = resolve_material(specimen)
     found = select(specimen, seed=seed, replicates=replicates, material=material, tell=tell)
     write_csv(found.models, run / "models.csv")

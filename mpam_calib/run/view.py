@@ -19,6 +19,7 @@ from mpam_calib.prediction.left_out import levels_left_out
 from mpam_calib.report.view import OBSERVED_COLUMNS, CalibrationView, Convergence
 from mpam_calib.run.folder import versions
 from mpam_calib.run.strain_range import strain_range_table
+from mpam_calib.specimen.oddities import oddities
 from mpam_calib.units import KPA
 
 Array = NDArray[np.float64]
@@ -136,7 +137,7 @@ def _settings(calibration: Calibration) -> dict[str, str]:
 
 def _warnings(calibration: Calibration) -> list[str]:
     blueprint = calibration.model.blueprint
-    warnings = list(calibration.specimen.notes)
+    warnings = oddities(calibration.specimen)
     if blueprint.material is not None:
         low, high = blueprint.material.strain_range
         warnings.append(

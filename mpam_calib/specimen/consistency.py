@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from mpam_calib.specimen.declaration import E_REL_SD, Declaration, Simulation
 from mpam_calib.specimen.toml_source import TomlSource
 from mpam_calib.specimen.validation import fault
 
+CONTRACTS_DEG = math.degrees(math.asin(1.0 / math.sqrt(3.0)))
+"""Braid angle from the hoop direction above which a muscle contracts under pressure."""
 LEAST_LEVELS = {"linear": 2, "exponential": 3, "exponential_each": 3}
 """Pressure levels that a law needs: two make a line; three tell an exponential from one."""
 
@@ -27,6 +30,7 @@ def normalised_simulation(source: TomlSource, declaration: Declaration) -> Simul
     tensile = bool(declaration.files.of("tensile"))
     _check_moduli(source, simulation, tensile)
     _check_braid(source, declaration)
+    _check_twice(source, simulation)
     if tensile and not declaration.files.muscle and declaration.geometry is None:
         return simulation.model_copy(update={"moduli": "tensile", "law": "constant", "friction": "none"})
     if simulation.moduli.startswith("run:"):
@@ -50,6 +54,11 @@ def check_parts(source: TomlSource, declaration: Declaration, *, data_required: 
     if declaration.geometry is None and (muscle or nothing):
         expected = "L0_mm, R0_mm, t0_mm and alpha0_deg of the muscle"
         raise fault(source, ["geometry"], "no table [geometry]", expected)
+    if muscle and declaration.geometry is not None and declaration.geometry.alpha0_deg <= CONTRACTS_DEG:
+        given = declaration.geometry.alpha0_deg
+        found = f"{given:g}, a braid that lengthens under pressure (the angle from the axis?)"
+        expected = f"above {CONTRACTS_DEG:.1f} degrees from the hoop direction ({90.0 - given:g}?)"
+        raise fault(source, ["geometry", "alpha0_deg"], found, expected)
     strain = declaration.fit.tensile_strain
     if strain is not None and not declaration.files.of("tensile"):
         keys = ["fit", "tensile_strain"]
@@ -145,3 +154,14 @@ def _check_braid(source: TomlSource, declaration: Declaration) -> None:
     if users and declaration.braid is None:
         keys = ["simulation", "effects" if "=" not in users[0] else "friction"]
         raise fault(source, keys, f"{users[0]} without a [braid]", "E_br_GPa, nu_s, R_br_mm and n in [braid]")
+
+
+def _check_twice(source: TomlSource, simulation: Simulation) -> None:
+    """Refuse an effect that the simulation has already."""
+    has = {f"{simulation.friction}_friction": f'friction = "{simulation.friction}"'}
+    if simulation.kinematics == "inextensible_braid":
+        has["braid_kinematics"] = 'kinematics = "inextensible_braid"'
+    for name in simulation.effect_ids:
+        if name in has:
+            keys = ["simulation", "effects"]
+            raise fault(source, keys, f'"{name}" beside {has[name]}, which is the same', "one of them")

@@ -69,6 +69,14 @@ class Geometry(Table):
             raise ValueError(f"t0_mm = {self.t0_mm:g}|a wall thinner than R0_mm = {self.R0_mm:g}")
         return self
 
+    @model_validator(mode="after")
+    def _sd_below_value(self) -> Geometry:
+        for name in ("L0_mm", "R0_mm", "t0_mm", "alpha0_deg"):
+            sd, value = getattr(self.sd, name), getattr(self, name)
+            if sd >= value:
+                raise ValueError(f"sd of {name} = {sd:g}|one sigma below {name} = {value:g} itself")
+        return self
+
     @property
     def L0(self) -> float:
         """Length at rest, m."""

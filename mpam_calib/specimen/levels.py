@@ -15,6 +15,8 @@ SAME_LEVEL_SHARE = 0.02
 LEAST_RUN = 5
 """Fewer rows than this far from their stroke's level are noise, not a change of level."""
 SMALLEST_GAP_PA = 0.3 * KPA
+SETPOINT_SHARE = 0.2
+"""A level's readings may differ from its setpoint by this share of it."""
 STATIC_GAPS = (0.01, 0.02)
 """Gaps between static levels, as shares of the largest reading: never below, surely above."""
 STROKE_GAPS = (0.025, 0.04)
@@ -115,3 +117,14 @@ def medians_by_label(values: Floats, labels: Ints) -> Floats:
     order = np.argsort(labels, kind="stable")
     pieces = np.split(values[order], run_starts(labels[order])[1:])
     return np.array([np.median(piece) for piece in pieces])
+
+
+def setpoint_notes(setpoint: Floats, level: Ints, levels_Pa: Floats) -> list[str]:
+    """A remark where setpoints (Pa, (rows,)) say other pressures than the readings of their levels."""
+    wanted = medians_by_label(setpoint, level)
+    apart = np.abs(wanted - levels_Pa) > SETPOINT_SHARE * np.maximum(np.abs(wanted), SAME_LEVEL_PA)
+    if not apart.any():
+        return []
+    worst = int(np.argmax(np.where(apart, np.abs(wanted - levels_Pa), 0.0)))
+    said, read = wanted[worst] / KPA, levels_Pa[worst] / KPA
+    return [f"loops: setpoint_kPa is {said:.4g} where pressure_kPa reads {read:.4g}; it only groups the rows"]

@@ -11,7 +11,7 @@ import pandas as pd
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import Geometry
-from mpam_calib.specimen.levels import medians_by_label, stroke_levels
+from mpam_calib.specimen.levels import medians_by_label, setpoint_notes, stroke_levels
 from mpam_calib.specimen.motion import (
     Motion,
     cycles_at_turns,
@@ -22,7 +22,13 @@ from mpam_calib.specimen.motion import (
     run_starts,
     turn_threshold,
 )
-from mpam_calib.specimen.plausibility import check_displacement, check_force, check_pressure
+from mpam_calib.specimen.plausibility import (
+    check_branch,
+    check_changes,
+    check_displacement,
+    check_force,
+    check_pressure,
+)
 from mpam_calib.specimen.recording import DEPRESSURISING, PRESSURISING, Bools, Floats, Ints, Loops
 from mpam_calib.specimen.reduction import average_rows, rows_per_mean
 from mpam_calib.specimen.source import DataFile
@@ -78,6 +84,8 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
     pressure = rows["pressure_kPa"].to_numpy() * KPA
     level, levels_Pa = _sorted_levels(pressure, level)
     _check_levels(files, frames, clock, level, levels_Pa)
+    if "setpoint_kPa" in everywhere:
+        notes += setpoint_notes(rows["setpoint_kPa"].to_numpy() * KPA, level, levels_Pa)
     if "cycle" in everywhere:
         cycle = rows["cycle"].to_numpy().astype(np.int64)
         if "branch" not in everywhere:
@@ -165,6 +173,10 @@ def _check_plausible(file: DataFile, frame: pd.DataFrame, geometry: Geometry) ->
     rows = frame.index.to_numpy()
     check_displacement(file.label, frame["displacement_mm"].to_numpy() * MM, rows, geometry, held=held)
     check_force(file.label, "loops", frame["force_N"].to_numpy(), frame["displacement_mm"].to_numpy())
+    check_changes(file.label, frame["force_N"].to_numpy())
+    if "branch" in frame:
+        branch = frame["branch"].to_numpy().astype(np.int64)
+        check_branch(file.label, branch, frame["displacement_mm"].to_numpy() * MM, rows)
 
 
 def _levels_and_motion(frames: Sequence[pd.DataFrame], clock: Ints, setpoints: bool) -> tuple[Ints, Motion]:

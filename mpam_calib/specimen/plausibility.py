@@ -13,11 +13,14 @@ from mpam_calib.specimen.recording import Floats, Ints
 from mpam_calib.units import KPA, MM
 
 HIGHEST_LEVEL_KPA = 5000.0
+ATMOSPHERE_KPA = 101.325
 HIGHEST_STRAIN = 20.0
 LEAST_STROKE = 0.005
 """Smaller largest displacements, as a share of L0, are taken for metres."""
 LONG_SHARE = 0.1
 """Share of the rows that are taken as those where the muscle is long."""
+AGAINST = 0.8
+"""Share of all motion against its branch's direction from which the words are taken for swapped."""
 
 
 def map_hint(kind: FileKind, column: str, scale: str) -> str:
@@ -26,7 +29,12 @@ def map_hint(kind: FileKind, column: str, scale: str) -> str:
 
 
 def check_pressure(label: str, kind: FileKind, pressure_Pa: Floats, rows: Ints) -> None:
-    """Refuse a level above 5,000 kPa; ``rows`` are the editor's numbers of the readings."""
+    """Refuse a level above 5,000 kPa or below a vacuum; ``rows`` are the editor's numbers of the readings."""
+    low = np.flatnonzero(pressure_Pa < -ATMOSPHERE_KPA * KPA)
+    if len(low):
+        found = f"a pressure level of {pressure_Pa[low[0]] / KPA:g} kPa"
+        expected = f"above the atmosphere's, or down to -{ATMOSPHERE_KPA:g} kPa (a vacuum)"
+        raise InputError(label, found, expected, int(rows[low[0]]), "pressure_kPa")
     high = np.flatnonzero(pressure_Pa > HIGHEST_LEVEL_KPA * KPA)
     if len(high):
         found = f"a pressure level of {pressure_Pa[high[0]] / KPA:g} kPa (pascals?)"
@@ -46,6 +54,27 @@ def check_force(label: str, kind: FileKind, force_N: Floats, shortening: Floats 
         found = f"a median force of {median:.3g} N (flipped sign?)"
         expected = f"pulling forces above 0; {map_hint(kind, 'force_N', '-1.0')}"
         raise InputError(label, found, expected, None, "force_N")
+
+
+def check_changes(label: str, force_N: Floats) -> None:
+    """Refuse loops whose force never changes."""
+    if np.ptp(force_N) == 0.0 and len(force_N) > 1:
+        found = f"a force that never changes ({force_N[0]:g} throughout)"
+        raise InputError(label, found, "the load cell's readings", None, "force_N")
+
+
+def check_branch(label: str, branch: Ints, displacement_m: Floats, rows: Ints) -> None:
+    """Refuse branches whose words are swapped: loading pulls back, so that the displacement falls."""
+    starts = np.flatnonzero(np.diff(branch, prepend=branch[0] - 1))
+    ends = np.append(starts[1:], len(branch)) - 1
+    sign = np.where(np.abs(branch[starts]) == 1, branch[starts], 0)
+    way = sign * (displacement_m[ends] - displacement_m[starts])
+    if way[way > 0.0].sum() > AGAINST * np.abs(way).sum():
+        first = int(starts[np.argmax(way)])
+        word = "loading" if branch[first] == 1 else "unloading"
+        found = f"{word} where displacement_mm {'rises' if branch[first] == 1 else 'falls'} (swapped?)"
+        expected = "loading where the muscle is pulled back to its length, unloading where it contracts"
+        raise InputError(label, found, expected, int(rows[first]), "branch")
 
 
 def check_strain(label: str, strain: Floats, rows: Ints) -> None:

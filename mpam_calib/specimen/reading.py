@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mpam_calib.errors import InputError
 from mpam_calib.specimen.consistency import (
     check_levels,
     check_parts,
@@ -18,7 +19,7 @@ from mpam_calib.specimen.consistency import (
 from mpam_calib.specimen.declaration import Declaration, FileKind
 from mpam_calib.specimen.levels import medians_by_label, merge_levels, static_levels
 from mpam_calib.specimen.loops import LoopsRead, read_loops
-from mpam_calib.specimen.recording import BlockedForce, FileRead, Floats, FreeContraction, Specimen
+from mpam_calib.specimen.recording import BlockedForce, Bools, FileRead, Floats, FreeContraction, Specimen
 from mpam_calib.specimen.source import DataFile, data_files, digest
 from mpam_calib.specimen.static_files import (
     ForceMapRead,
@@ -29,6 +30,7 @@ from mpam_calib.specimen.static_files import (
 )
 from mpam_calib.specimen.toml_source import TomlSource, read_toml
 from mpam_calib.specimen.validation import validate
+from mpam_calib.units import KPA
 
 
 def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
@@ -68,6 +70,13 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
         first = next(file for file in files if file.kind != "tensile")
         check_rows(first.label, muscle_rows, least_parameters(simulation, len(levels_Pa)))
         check_levels(source, simulation, len(levels_Pa))
+        muscle = (
+            None if loops is None else loops.loops,
+            None if force_map is None else force_map.force_map,
+            blocked,
+        )
+        flags = [part.censored for part in muscle if part is not None]
+        _check_pulls(first.label, levels_Pa, flags)
     return Specimen(
         name=declaration.specimen.name,
         bladder_material=declaration.specimen.bladder_material,
@@ -118,6 +127,16 @@ def _common_levels(
         moved = replace(force_map.force_map, level=map_index[force_map.force_map.level])
         force_map = replace(force_map, force_map=moved)
     return levels, loops, force_map
+
+
+def _check_pulls(label: str, levels_Pa: Floats, censored: list[Bools]) -> None:
+    """Refuse data without a pressure, or without a force."""
+    if levels_Pa[-1] <= 0.0:
+        found = f"no pressure level above {levels_Pa[-1] / KPA:g} kPa (flipped sign?)"
+        raise InputError(label, found, "gauge pressures above 0", None, "pressure_kPa")
+    if censored and all(flags.all() for flags in censored):
+        found = "every row slack (at or below the floor, or censored)"
+        raise InputError(label, found, "readings above the floor", None, "force_N")
 
 
 def _rows_in_range(strain: Floats, limits: tuple[float, float] | None) -> int:

@@ -171,6 +171,18 @@ def test_an_output_that_cannot_be_a_folder_is_refused(muscle: Path, tmp_path: Pa
     assert file.read_text() == "mine"
 
 
+@pytest.mark.parametrize("command", ["calibrate", "select", "diagnose"])
+def test_results_do_not_mix_with_a_specimen(command: str, muscle: Path, tmp_path: Path, here: Here) -> None:
+    specimen = Path(shutil.copytree(muscle, tmp_path / "own"))
+    before = stamps(specimen)
+    result = here(command, specimen, "-o", specimen)
+    assert result.code == 2
+    assert result.complaint.startswith(
+        f"error: {specimen}: found a specimen's folder, expected one of its own"
+    )
+    assert stamps(specimen) == before
+
+
 @pytest.mark.parametrize("target", ["nothing", "small"])
 def test_moduli_of_a_run_that_is_none_are_refused(
     target: str, muscle: Path, tmp_path: Path, here: Here

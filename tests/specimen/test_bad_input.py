@@ -87,6 +87,18 @@ def with_branch(word: str) -> Spoil:
     return rows(change)
 
 
+def swapped(folder: Path) -> None:
+    """The words for the directions, and for most rows the wrong ones."""
+
+    def change(lines: list[str]) -> list[str]:
+        x = [float(line.split(",")[2]) for line in lines[1:]]
+        rises = [after >= before for before, after in zip(x, [*x[1:], x[-1]], strict=True)]
+        words = ["loading" if rising else "unloading" for rising in rises]
+        return [lines[0] + ",branch", *(f"{a},{b}" for a, b in zip(lines[1:], words, strict=True))]
+
+    rows(change)(folder)
+
+
 CASES: dict[str, tuple[Spoil, list[str]]] = {
     "missing file": (lambda f: (f / "loops.csv").unlink(), ["loops.csv: found no such file"]),
     "empty file": (raw(b""), ["loops.csv: found an empty file"]),
@@ -107,6 +119,37 @@ CASES: dict[str, tuple[Spoil, list[str]]] = {
     "infinite": (cell(6, 3, "inf"), ["loops.csv:6:force_N: found inf, expected a finite number"]),
     "overflow": (cell(6, 3, "1e999"), ["loops.csv:6:force_N: found inf"]),
     "hexadecimal": (cell(6, 3, "0x10"), ['loops.csv:6:force_N: found "0x10"']),
+    "no pressure": (scaled(1, -0.5), ["loops.csv:", "flipped sign?"]),
+    "below a vacuum": (scaled(1, -3.0), ["loops.csv:2:pressure_kPa: found a pressure level of -", "vacuum"]),
+    "a force that rests": (scaled(3, 0.0), ["loops.csv:force_N: found a force that never changes (0 "]),
+    "branches swapped": (
+        swapped,
+        ["loops.csv:", ":branch: found loading where displacement_mm rises (swapped?)"],
+    ),
+    "all slack": (
+        toml("[files]", "[sensors]\nforce_floor_N = 1e6\n[files]"),
+        ["loops.csv:force_N: found every row slack"],
+    ),
+    "angle from the axis": (
+        toml("72.0", "18.0"),
+        [
+            "specimen.toml:8:geometry.alpha0_deg: found 18, a braid that lengthens",
+            "above 35.3 degrees",
+            "72?",
+        ],
+    ),
+    "geometry that nobody knows": (
+        toml("[files]", "[geometry.sd]\nR0_mm = 50.0\n[files]"),
+        ["sd of R0_mm = 50", "one sigma below R0_mm = 3 itself"],
+    ),
+    "friction twice": (
+        append('effects = ["coulomb_friction"]\n'),
+        ['"coulomb_friction" beside friction = "coulomb"'],
+    ),
+    "kinematics twice": (
+        append('effects = ["braid_kinematics"]\n'),
+        ['"braid_kinematics" beside kinematics = "inextensible_braid"'],
+    ),
     "short row": (
         rows(lambda lines: [*lines[:8], "0.9,50.0", *lines[9:]]),
         ["loops.csv:9: found a row of 2 cells, expected 4"],

@@ -9,9 +9,9 @@ import pytest
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen import read
-from mpam_calib.specimen.summary import oddities
+from mpam_calib.specimen.oddities import oddities
 
-from .folders import loops, make
+from .folders import DECLARATION, loops, make
 
 Change = Callable[[list[list[str]]], None]
 
@@ -28,6 +28,10 @@ def blip(rows: list[list[str]]) -> None:
     rows[7][3] = "-9999"
 
 
+def gust(rows: list[list[str]]) -> None:
+    rows[7][1] = "-9999"
+
+
 def remarks(folder: Path, change: Change | None = None) -> str:
     header, *body = loops().text().splitlines()
     rows = [line.split(",") for line in body]
@@ -38,7 +42,8 @@ def remarks(folder: Path, change: Change | None = None) -> str:
 
 def test_nothing_is_odd_in_a_plain_test(tmp_path: Path) -> None:
     found = remarks(tmp_path)
-    assert "far from" not in found and "gas alone" not in found
+    for words in ("far from", "gas alone", "seconds", "millimetres", "setpoint", "pascals", "bias"):
+        assert words not in found
 
 
 @pytest.mark.parametrize(
@@ -48,6 +53,10 @@ def test_nothing_is_odd_in_a_plain_test(tmp_path: Path) -> None:
         pytest.param(times(3, 1e-3), "while the gas alone pulls about", id="kilonewtons"),
         pytest.param(times(3, 1e3), "while the gas alone pulls about", id="millinewtons"),
         pytest.param(blip, "a force is far from all others (-9999 N)", id="a missing value's code"),
+        pytest.param(gust, "50 kPa has a reading far from it (-9999 kPa)", id="the same of a pressure"),
+        pytest.param(times(2, 0.1), "is displacement_mm in millimetres", id="centimetres"),
+        pytest.param(times(0, 1e3), "a reading every 100 s; is time_s in seconds?", id="milliseconds"),
+        pytest.param(times(0, 1e-3), "mm/min; is time_s in seconds?", id="kiloseconds"),
     ],
 )
 def test_what_is_hardly_meant_is_said(change: Change, said: str, tmp_path: Path) -> None:
@@ -60,3 +69,31 @@ def test_per_cent_of_strain_are_refused(tmp_path: Path) -> None:
     (folder / "tensile.csv").write_text("strain,stress_Pa\n" + rows)
     with pytest.raises(InputError, match=r"tensile.csv:5:strain: found 30 \(per cent\?\)"):
         read(folder)
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(1.0, ""), (1.1, ""), (0.01, "setpoint_kPa is 1.5 where pressure_kPa reads 150")]
+)
+def test_setpoints_that_say_other_pressures(factor: float, said: str, tmp_path: Path) -> None:
+    header, *body = loops().text().splitlines()
+    rows = [f"{line},{factor * round(float(line.split(',')[1]))}" for line in body]
+    text = "\n".join([f"{header},setpoint_kPa", *rows]) + "\n"
+    found = " ".join(oddities(read(make(tmp_path, loops=text))))
+    assert said in found if said else "setpoint" not in found
+
+
+def test_a_gauge_that_knows_nothing_and_moduli_in_megapascals(tmp_path: Path) -> None:
+    text = DECLARATION.replace("[files]", "[sensors]\npressure_bias_sd_kPa = 1e9\n[files]")
+    found = " ".join(oddities(read(make(tmp_path / "a", text, loops=loops().text()))))
+    assert "pressure_bias_sd_kPa = 1e+09 is above the highest level, 150 kPa" in found
+    text = DECLARATION.replace("order = 2", 'moduli = "tensile"\nE_Pa = [0.04, 0.02]')
+    found = " ".join(oddities(read(make(tmp_path / "b", text, loops=loops().text()))))
+    assert "a modulus of 0.04 Pa; is it in pascals?" in found
+
+
+@pytest.mark.parametrize(("scale", "odd"), [(1.0, False), (1e-6, True)])
+def test_a_tensile_test_in_megapascals(scale: float, odd: bool, tmp_path: Path) -> None:
+    folder = make(tmp_path, '[specimen]\nname = "Rubber"\n[files]\ntensile = "tensile.csv"\n')
+    rows = "".join(f"{0.1 * k:.3g},{5e3 * k * scale:.6g}\n" for k in range(12))
+    (folder / "tensile.csv").write_text("strain,stress_Pa\n" + rows)
+    assert ("is it in pascals?" in " ".join(oddities(read(folder)))) == odd

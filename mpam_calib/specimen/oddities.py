@@ -1,0 +1,194 @@
+"""What can be used but is hardly meant: remarks for ``check``, one sentence each."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mpam_calib.specimen.plausibility import longest_contraction
+from mpam_calib.specimen.recording import Floats, Loops, Specimen
+from mpam_calib.specimen.summary import BRANCH_NAMES, sampling_rates, stroke_speeds
+from mpam_calib.units import KPA, MINUTE, MM
+
+GAP_STEPS = 20.0
+"""A pause in the recording is this many times longer than the usual step."""
+WANDER_SHARE = 0.05
+"""Pressure that strays further than this share from its level is worth a remark."""
+FAR_LEVEL = 0.5
+"""Readings further from their level than this share of the highest are no wandering."""
+USUAL_SHARE = 0.99
+"""Forces and pressures up to this quantile are the usual ones ..."""
+FAR = 30.0
+"""... and this many times as large is far from them; forces of muscles are within it of the gas's own."""
+SLOW_HZ, FAST = 0.05, 0.2
+"""Readings rarer than this, and crossheads faster (m/s), are no tensile tester's."""
+STIFFNESS_PA = 100.0, 1e11
+"""Between these are the moduli of everything that a bladder is made of, and far beyond."""
+SMALL_SHARE = 0.12
+"""Contractions that stay below this share of what the braid allows may be in other units."""
+
+
+def oddities(specimen: Specimen) -> list[str]:
+    """What can be used but should be looked at, one sentence each."""
+    remarks = list(specimen.notes)
+    loops = specimen.loops
+    if loops is not None:
+        remarks += _odd_times(loops)
+        remarks += _odd_speeds(loops)
+        remarks += _odd_levels(loops, specimen.levels_Pa)
+    remarks += _odd_forces(specimen)
+    remarks += _odd_contractions(specimen)
+    remarks += _odd_stiffness(specimen)
+    gauge, top = specimen.sensors.pressure_bias_sd_kPa, float(specimen.levels_Pa.max(initial=0.0)) / KPA
+    if gauge > top > 0.0:
+        remarks.append(f"sensors: pressure_bias_sd_kPa = {gauge:g} is above the highest level, {top:.4g} kPa")
+    for name, part in (
+        ("loops", loops),
+        ("force_map", specimen.force_map),
+        ("blocked_force", specimen.blocked_force),
+    ):
+        if part is not None and part.censored.any():
+            count = int(part.censored.sum())
+            remarks.append(
+                f"{name}: {count} of {len(part.censored)} rows are slack (at the floor or censored)"
+            )
+    return remarks
+
+
+def _odd_times(loops: Loops) -> list[str]:
+    remarks = []
+    for clock in np.unique(loops.clock):
+        time, level = loops.time_s[loops.clock == clock], loops.level[loops.clock == clock]
+        steps = np.diff(time)
+        if not len(steps):
+            continue
+        # A pause between two levels is the protocol's; one within a level is not.
+        gaps = np.flatnonzero((steps > GAP_STEPS * np.median(steps)) & (np.diff(level) == 0))
+        if len(gaps):
+            longest = gaps[np.argmax(steps[gaps])]
+            many = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps"
+            remarks.append(
+                f"loops: {many} in the time of file {clock + 1} within a level, "
+                f"the longest {steps[longest]:.3g} s after {time[longest]:.6g} s"
+            )
+    return remarks
+
+
+def _odd_speeds(loops: Loops) -> list[str]:
+    """Times that are hardly seconds."""
+    remarks = []
+    rates, speeds = sampling_rates(loops), stroke_speeds(loops)
+    if rates and min(rates) < SLOW_HZ:
+        remarks.append(f"loops: a reading every {1.0 / min(rates):.3g} s; is time_s in seconds?")
+    if speeds.max(initial=0.0) > FAST:
+        fastest = speeds.max() * MINUTE / MM
+        remarks.append(f"loops: the crosshead moves at {fastest:.3g} mm/min; is time_s in seconds?")
+    return remarks
+
+
+def _odd_levels(loops: Loops, levels_Pa: Floats) -> list[str]:
+    remarks = []
+    for index in np.unique(loops.level):
+        rows = loops.level == index
+        name = f"loops: {levels_Pa[index] / KPA:.4g} kPa"
+        present = [int(code) for code in np.unique(loops.branch[rows]) if code != 0]
+        if len(present) == 1:
+            remarks.append(f"{name} has only the branch {BRANCH_NAMES[present[0]]}")
+        held = np.abs(loops.branch[rows]) == 2
+        steady = loops.pressure_Pa[rows][~held]
+        if len(steady):
+            stray = float(np.quantile(np.abs(steady - levels_Pa[index]), 0.99))
+            if stray > WANDER_SHARE * abs(levels_Pa[index]):
+                remarks.append(f"{name} wanders by {stray / KPA:.3g} kPa")
+            blips = np.abs(steady - levels_Pa[index]) > max(FAR_LEVEL * levels_Pa.max(), 2.0 * stray)
+            if blips.any():
+                worst = steady[np.abs(steady - levels_Pa[index]).argmax()] / KPA
+                many = "a reading" if blips.sum() == 1 else f"{int(blips.sum())} readings"
+                remarks.append(f"{name} has {many} far from it ({worst:.4g} kPa)")
+        idle = int((loops.branch[rows] == 0).sum())
+        if idle:
+            remarks.append(
+                f"{name} has {idle} rows without a branch (before the first motion, or empty cells)"
+            )
+    return remarks
+
+
+def _odd_forces(specimen: Specimen) -> list[str]:
+    """Forces far from what the gas can pull, and readings far from all others."""
+    if specimen.geometry is None:
+        return []
+    geometry, remarks = specimen.geometry, []
+    # Chou and Hannaford 1996 (doi:10.1109/70.481753) at the initial length; alpha0 from the hoop direction.
+    per_pascal = 3.0 * math.tan(geometry.alpha0) ** 2 - 1.0 / math.cos(geometry.alpha0) ** 2
+    per_pascal *= math.pi * geometry.R0**2
+    for name, part in (
+        ("loops", specimen.loops),
+        ("force_map", specimen.force_map),
+        ("blocked_force", specimen.blocked_force),
+    ):
+        if part is None:
+            continue
+        usual = float(np.quantile(np.abs(part.force_N), USUAL_SHARE))
+        stray = int((np.abs(part.force_N) > FAR * usual).sum()) if usual > 0.0 else 0
+        if stray:
+            extreme = part.force_N[np.abs(part.force_N).argmax()]
+            many = "a force is" if stray == 1 else f"{stray} forces are"
+            remarks.append(f"{name}: {many} far from all others ({extreme:.4g} N)")
+        gas = per_pascal * float(np.quantile(part.pressure_Pa, USUAL_SHARE))
+        if gas > 0.0 and not gas / FAR < usual < FAR * gas:
+            remarks.append(
+                f"{name}: forces up to {usual:.3g} N, while the gas alone pulls about {gas:.3g} N at the "
+                "highest pressure; are the units of force, pressure and radius right?"
+            )
+    return remarks
+
+
+def _odd_contractions(specimen: Specimen) -> list[str]:
+    if specimen.geometry is None:
+        return []
+    geometry = specimen.geometry
+    parts: dict[str, Floats] = {}
+    if specimen.loops is not None:
+        parts["loops"] = specimen.loops.displacement_m / geometry.L0
+    if specimen.force_map is not None:
+        parts["force_map"] = specimen.force_map.contraction
+    if specimen.free_contraction is not None:
+        parts["free_contraction"] = specimen.free_contraction.contraction
+    # Beyond sin(alpha) = 1/sqrt(3) a thin-walled muscle pushes instead of pulling.
+    limit = 1.0 - 1.0 / (math.sqrt(3.0) * math.sin(geometry.alpha0))
+    longest = longest_contraction(geometry)
+    remarks = []
+    for name, contraction in parts.items():
+        if name == "loops" and contraction.max() < SMALL_SHARE * limit:
+            remarks.append(
+                f"loops: contractions up to {contraction.max():.3g}, while the braid allows {limit:.2g}; is "
+                "displacement_mm in millimetres, and L0_mm the free length?"
+            )
+        beyond, straight = int((contraction > limit).sum()), int((contraction <= longest).sum())
+        if beyond:
+            remarks.append(
+                f"{name}: {beyond} rows contract further than the braid's limit of {limit:.3f} "
+                f"(largest {contraction.max():.3f}); is alpha0_deg from the hoop direction?"
+            )
+        if straight:
+            remarks.append(
+                f"{name}: {straight} rows are longer than the straight strands (contraction {longest:.3f})"
+            )
+    return remarks
+
+
+def _odd_stiffness(specimen: Specimen) -> list[str]:
+    """Moduli that no bladder has."""
+    stiffness: dict[str, float] = {}
+    if specimen.simulation.E_Pa is not None:
+        stiffness["E_Pa: a modulus of"] = max(map(abs, specimen.simulation.E_Pa))
+    if specimen.tensile is not None and (stretched := specimen.tensile.strain > 0.0).any():
+        ratio = np.abs(specimen.tensile.stress_Pa[stretched] / specimen.tensile.strain[stretched])
+        stiffness["tensile: a stiffness of about"] = float(np.median(ratio))
+    low, high = STIFFNESS_PA
+    return [
+        f"{what} {value:.2g} Pa; is it in pascals?"
+        for what, value in stiffness.items()
+        if not low <= value <= high
+    ]
