@@ -99,6 +99,11 @@ class Chain:
         """Whether an effect needs the muscle's own force."""
         return any(item.uses_force for item in self.effects)
 
+    @property
+    def memory(self) -> bool:
+        """Whether an effect looks at what was before."""
+        return any(item.memory for item in self.effects)
+
     def terms(self, values: Values, readings: Readings, guide: Array | None = None) -> Terms:
         """The force's fixed part and its columns.
 

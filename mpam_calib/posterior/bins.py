@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 BINS = 32
+SHARED = 22
+"""Bins of strokes that repeat each other: as many as one stroke's nodes have."""
 FINE = np.array([0.25, 0.5, 0.75, 1.0, 1.5, 2.0])
 """The first bins of a stroke are divided further: friction turns over there."""
 UNREDUCED = 16
@@ -107,9 +109,10 @@ def _edges(rest: NDArray[np.bool_], most: int, finest: int) -> Ints:
     return np.unique(np.concatenate([edges, ends[ends < n]])).astype(np.int64)
 
 
-def bin_loops(loops: Loops, most: int = BINS, finest: int = 2) -> LoopBins:
+def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = True) -> LoopBins:
     """Reduce loops (rows in time order) to about ``most`` bins a stroke.
 
+    Without ``memory`` strokes that repeat each other share their ``nodes``.
     Those at its turn are finer where they keep ``finest`` rows: in bins of one row the encoder's noise may go
     back and forth, and a covariance of such bins is no chain along the way.
     """
@@ -177,6 +180,8 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2) -> LoopBins:
     ]
     ends = stroke_starts + lengths - 1
     dt = (loops.time_s[ends] - loops.time_s[stroke_starts]) / np.maximum(lengths - 1, 1)
+    strokes = np.repeat(np.arange(len(lengths)), lengths)
+    repeated = None if memory else Nodes.of_repeated(loops.force_N, rows, strokes, SHARED)
     scatter, chunks = _scatter(loops, starts, stops, segment, position, dt)
     return LoopBins(
         readings=Readings.join(halves),
@@ -198,7 +203,7 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2) -> LoopBins:
         scatter=scatter,
         chunks=chunks,
         averaged=loops.averaged,
-        nodes=Nodes.build(loops.force_N, rows, _wider(starts, segment, position, most)),
+        nodes=repeated or Nodes.build(loops.force_N, rows, _wider(starts, segment, position, most)),
     )
 
 

@@ -76,6 +76,8 @@ class Collapsed:
         parts = (bins, points, None if tensile is None else tensile.strain)
         readings = sum(len(part) for part in parts if part is not None)
         saved = 0 if bins is None or self._strokes is None else len(bins) * self._strokes.saved
+        if bins is not None and self._white_only:
+            readings += len(bins.nodes.force) // 2 - len(bins)
         return readings * (1 + sum(self.model.linear_sizes)) - saved
 
     def log_posterior(self, u: Array) -> Array:
@@ -167,7 +169,7 @@ class Collapsed:
         assert self.model.chain is not None
         dof = values[FREEDOM][:, 0] if FREEDOM in values else None
         uneven = GROWTH in values or dof is not None
-        if not (uneven or CORRELATED in values or ROUGH in values or bins.slack.any()):
+        if self._white_only:
             return self._white_bins(values, bins)
         if self._strokes is not None:
             return self._even_bins(values, bins, self._strokes)
@@ -254,6 +256,20 @@ class Collapsed:
         return Piece(full[:, :-1, :-1], full[:, :-1, -1], constant).widened(sum(self.model.linear_sizes))
 
     @cached_property
+    def _white_only(self) -> bool:
+        """Whether all bins have readings whose noise is white and of one size."""
+        bins = self.data.bins
+        others = {GROWTH, FREEDOM, CORRELATED, ROUGH} & set(self.model.names)
+        return bins is not None and not others and not bool(bins.slack.any())
+
+    @cached_property
+    def _node_guide(self) -> Array | None:
+        """The guide's force (N) at the bins' nodes."""
+        assert self.data.bins is not None
+        bins = self.data.bins
+        return bins.nodes.interpolate(self.guide.bins, bins.readings, bins.segment)
+
+    @cached_property
     def _strokes(self) -> Strokes | None:
         """The bins, where their noise allows them to be taken as one."""
         bins, names = self.data.bins, self.model.names
@@ -300,8 +316,7 @@ class Collapsed:
         """Bins without correlated noise and remainder: all rows count, at less cost."""
         assert self.model.chain is not None
         nodes = bins.nodes
-        guide = nodes.interpolate(self.guide.bins, bins.readings.time)
-        fixed, slope, columns, _ = self.model.chain.factored(values, nodes.readings, guide)
+        fixed, slope, columns, _ = self.model.chain.factored(values, nodes.readings, self._node_guide)
         white = values[WHITE][:, 0]
         piece = white_terms(nodes, bins.averaged, fixed, slope, columns, white)
         return Piece(*piece).widened(sum(self.model.linear_sizes))

@@ -44,7 +44,7 @@ def build_target(specimen: Specimen, blueprint: Blueprint) -> Collapsed:
         tensile = gather_tensile(specimen.tensile, model.tensile.low, model.tensile.high)
     floor = specimen.sensors.force_floor_N
     data = Data(
-        bins=bin_loops(specimen.loops) if specimen.loops is not None and model.chain else None,
+        bins=_bins(specimen.loops, model) if specimen.loops is not None and model.chain else None,
         points=gather_points(specimen) if model.chain else None,
         tensile=tensile,
         floor=0.0 if floor is None else floor,
@@ -61,7 +61,7 @@ def without_level(specimen: Specimen, target: Collapsed, level: int) -> Collapse
     bins, points = data.bins, data.points
     if specimen.loops is not None and bins is not None:
         there = bins.readings.level != level
-        bins = _bins_without(specimen.loops, level)
+        bins = _bins(specimen.loops, target.model, level)
         if bins is not None and 2 * len(bins) == int(there.sum()):
             noise = None if guide.bin_noise is None else guide.bin_noise[there[: len(there) // 2]]
             guide = replace(guide, bins=None if guide.bins is None else guide.bins[there], bin_noise=noise)
@@ -75,11 +75,17 @@ def without_level(specimen: Specimen, target: Collapsed, level: int) -> Collapse
     return replace(target, data=replace(data, bins=bins, points=points), guide=guide)
 
 
-def _bins_without(loops: Loops, level: int) -> LoopBins | None:
-    out = loops.level == level
+def _bins(loops: Loops, model: Model, without: int | None = None) -> LoopBins | None:
+    """The loops' bins, but for one level's; None where there are no others."""
+    memory = model.chain is None or model.chain.memory
+    if without is None:
+        return bin_loops(loops, memory=memory)
+    out = loops.level == without
     if out.all():
         return None
-    return bin_loops(replace(loops, unclear=out if loops.unclear is None else out | loops.unclear))
+    return bin_loops(
+        replace(loops, unclear=out if loops.unclear is None else out | loops.unclear), memory=memory
+    )
 
 
 def _measured(data: Data) -> Guide:

@@ -195,6 +195,33 @@ def test_an_effect_is_the_rig_s_textbook_form(identifier):
     assert np.max(np.abs(expected - force_of(muscle, rows))) > 1e3 * tolerance
 
 
+EVERY_FORM = sorted(
+    f"{identifier}{form and ':'}{form}"
+    for identifier in PARAMETERS
+    for form in ("", *effect(identifier).all_forms)
+)
+
+
+@pytest.mark.parametrize("identifier", EVERY_FORM)
+def test_an_effect_without_memory_looks_at_nothing_that_was_before(identifier):
+    """Another past, the same force; and what is said to have a memory has one in some form."""
+    item = effect(identifier)
+    muscle = scene(item.id.partition(":")[0])
+    rows = record_rows(PROTOCOL, muscle, 1)
+    readings = readings_of(rows)
+    chain = chain_with(muscle, rows, (identifier,))
+    rng = np.random.default_rng(5)
+    values = declared_values(muscle)
+    values |= {p.name: p.prior.from_normal(np.full((1, 1), 1.0)) for p in item.parameters(chain.setting)}
+    past = ("time", "file_time", "time_at_level", "cycle", "test_cycle", "travel", "reversal", "speed")
+    other = replace(readings, **{name: rng.permutation(getattr(readings, name)) for name in past})
+    force, again = (chain.force(values, np.zeros((1, 1)), r) for r in (readings, other))
+    if not item.memory:
+        np.testing.assert_array_equal(force, again)
+    elif ":" not in identifier:
+        assert np.max(np.abs(force - again)) > 1e-3
+
+
 @pytest.mark.parametrize("times", [1.0, 10.0])
 def test_a_soft_fixture_is_in_balance_with_the_muscle(times):
     """The force at a reading is that of the muscle as much shorter as the fixture gives."""

@@ -34,6 +34,7 @@ register(
         source="thesis Eq. 2.1-2.3 with another α0",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         bends={"contraction": 1, "pressure": 2},
     )
 )

@@ -28,6 +28,7 @@ register(
         source="thesis Eq. 2.10, 2.23 in place of Eq. 4.16",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         bends={"contraction": 2},
     )
 )

@@ -31,6 +31,7 @@ register(
         source="thesis Eq. 2.25-2.26",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         needs_braid=True,
         bends={"contraction": 1, "pressure": 2},
         looseness=2.0,

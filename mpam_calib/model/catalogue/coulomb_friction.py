@@ -38,6 +38,7 @@ register(
         source="thesis Eq. 2.44",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         bends={"force": 1, "pressure": 2, "contraction": 1},
     )
 )

@@ -46,6 +46,7 @@ register(
         source="thesis Eq. 2.45; Hocking & Wereley 2013",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         forms={"soft": _soft},
         bends={"pressure": 3},
     )

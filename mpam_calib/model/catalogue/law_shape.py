@@ -52,6 +52,7 @@ register(
         source="bladder stress × (1 + Σ bend_j·Legendre polynomials in pressure beyond the law's)",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         bends={"contraction": 2},
     )
 )

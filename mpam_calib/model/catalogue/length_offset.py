@@ -29,6 +29,7 @@ register(
         source="true shortening = reading + offset",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         bends={"contraction": 1, "settling": 3},
     )
 )

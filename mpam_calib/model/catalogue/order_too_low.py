@@ -58,6 +58,7 @@ register(
         source="thesis Eq. 2.12 with M + 1 terms",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         bends={"contraction": 4},
         looseness=2.0,
     )

@@ -39,6 +39,7 @@ register(
         source="first order in the stroke: P(1 − droop·x/stroke)",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         forms={"level": _level},
         kinds={"level": "here full stroke is each level's own"},
         bends={"contraction": 3, "speed": 1},

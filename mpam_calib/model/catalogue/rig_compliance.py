@@ -31,6 +31,7 @@ register(
         source="true shortening = reading + compliance × force",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         uses_force=True,
         bends={"force": 2},
     )

@@ -38,6 +38,7 @@ register(
         source="thesis Eq. 2.43 (empirical)",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         needs_braid=True,
         bends={"pressure": 1, "contraction": 2},
     )

@@ -32,6 +32,7 @@ register(
         source="thesis Eq. 2.46-2.47",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         bends={"contraction": 4},
         looseness=2.0,
     )

@@ -27,6 +27,7 @@ register(
         source="thesis Eq. 2.9 (force balance, factor 0) against virtual work (factor 1)",
         parameters=_parameters,
         apply=_apply,
+        memory=False,
         bends={"contraction": 2, "pressure": 2},
     )
 )
