@@ -183,7 +183,7 @@ def _targets(
     sooner = min(outcome.to_wanted(scaled=True)[0] for outcome in rows) / short.process[0]
     sooner_cpu = min(outcome.to_wanted(scaled=True)[1] for outcome in rows) / short.process[1]
     growth = max(
-        ours.rates[1] / more[DENSER].rates[1],
+        *(ours.rates[1] / outcome.rates[1] for outcome in more.values()),
         full.rates[1] / more_full[DENSER].rates[1],
     )
     largest = max(outcome.memory for outcome in to_wanted)
