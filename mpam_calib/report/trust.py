@@ -217,7 +217,7 @@ CHECKS: tuple[Check, ...] = (
     Check(convergence, "the sampler has settled"),
     Check(
         between_levels,
-        "each level lies in the bands that the others give",
+        "the inner levels lie in the bands that the others give",
         lambda view: held_between(view) is not None,
     ),
     Check(beyond_levels),

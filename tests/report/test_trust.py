@@ -138,11 +138,11 @@ def test_levels_that_the_others_do_not_foresee(
 
 
 def test_levels_that_could_not_be_left_out_are_no_good_news(sound: CalibrationView) -> None:
-    told = ("each level lies", "recorded pressures")
+    told = ("inner levels lie", "recorded pressures")
     assert not any(words in reason for reason in trust.assess(sound).reasons for words in told)
     left_out = pd.DataFrame({"inside90": [0.9] * 3, "extrapolated": [True, False, True]})
     reasons = trust.assess(replace(sound, left_out=left_out)).reasons
-    assert "each level lies in the bands that the others give" in reasons[-1]
+    assert "the inner levels lie in the bands that the others give" in reasons[-1]
 
 
 def test_a_gauge_that_makes_up_the_band_is_named(sound: CalibrationView) -> None:
