@@ -24,7 +24,9 @@ WIDE_CAUTION: Final = 0.10
 WIDE_BAD: Final = 0.30
 """Half of the 90 % band over the value."""
 HELD: Final = 0.80
-"""Least share of a level's readings, predicted from other levels, in bands that should hold 90 %."""
+"""Least share of a level's readings, predicted from other levels, in bands that should hold 90 % ..."""
+HELD_READINGS: Final = 20
+"""... where there are so many; of fewer a fifth may lie outside by chance."""
 UNIDENTIFIED: Final = 0.20
 """A posterior that is narrower than its prior by less than this share learnt nothing."""
 GAUGE_SHARE: Final = 0.5
@@ -282,7 +284,7 @@ def headline_bands(view: CalibrationView) -> list[tuple[str, float, float, float
 
 
 def held_between(view: CalibrationView) -> float | None:
-    """Share of the inner levels' readings in the 90 % bands that the other levels give; None without any."""
+    """Share of the inner levels' readings in the 90 % bands that the others give; None where they are few."""
     return _held(view, extrapolated=False)
 
 
@@ -291,7 +293,7 @@ def _held(view: CalibrationView, extrapolated: bool) -> float | None:
     if rows.empty:
         return None
     rows = rows[rows["extrapolated"].astype(bool) == extrapolated]
-    return float(rows["inside90"].mean()) if len(rows) else None
+    return float(rows["inside90"].mean()) if rows["readings"].sum() >= HELD_READINGS else None
 
 
 def unidentified_names(view: CalibrationView) -> list[str]:

@@ -117,6 +117,11 @@ def test_extrapolation_at_the_top_level_only(sound: CalibrationView) -> None:
     assert "free contraction at 250 kPa" in limit.sentence
 
 
+def left_out_levels(inside: tuple[float, ...], readings: int = 200) -> pd.DataFrame:
+    outer = [True, *[False] * (len(inside) - 2), True]
+    return pd.DataFrame({"inside90": inside, "readings": readings, "extrapolated": outer})
+
+
 @pytest.mark.parametrize(
     ("inside", "between", "beyond"),
     [
@@ -129,7 +134,7 @@ def test_extrapolation_at_the_top_level_only(sound: CalibrationView) -> None:
 def test_levels_that_the_others_do_not_foresee(
     sound: CalibrationView, inside: tuple[float, ...], between: str | None, beyond: str | None
 ) -> None:
-    left_out = pd.DataFrame({"inside90": inside, "extrapolated": [True, False, False, True]})
+    left_out = left_out_levels(inside)
     view = replace(sound, left_out=left_out)
     limits = (trust.between_levels(view), trust.beyond_levels(view))
     assert tuple(limit.level if limit else None for limit in limits) == (between, beyond)
@@ -140,8 +145,9 @@ def test_levels_that_the_others_do_not_foresee(
 def test_levels_that_could_not_be_left_out_are_no_good_news(sound: CalibrationView) -> None:
     told = ("inner levels lie", "recorded pressures")
     assert not any(words in reason for reason in trust.assess(sound).reasons for words in told)
-    left_out = pd.DataFrame({"inside90": [0.9] * 3, "extrapolated": [True, False, True]})
-    reasons = trust.assess(replace(sound, left_out=left_out)).reasons
+    reasons = trust.assess(replace(sound, left_out=left_out_levels((0.9, 0.9, 0.9)))).reasons
+    few = trust.assess(replace(sound, left_out=left_out_levels((0.5, 0.5, 0.5), readings=9)))
+    assert few.reasons == trust.assess(sound).reasons
     assert "the inner levels lie in the bands that the others give" in reasons[-1]
 
 
