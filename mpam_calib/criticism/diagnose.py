@@ -14,7 +14,7 @@ from mpam_calib.criticism.gain import Gain, measure_gain
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.search import LARGEST, Search, Set, search
 from mpam_calib.criticism.structure import Structure, structure_tests
-from mpam_calib.criticism.verdict import LISTED, Verdict, judge
+from mpam_calib.criticism.verdict import BESIDE, LISTED, Verdict, judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
 from mpam_calib.model.effect import effect
@@ -89,15 +89,16 @@ def diagnose(
 def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
     """The content of ``diagnosis.json``."""
     verdict, budget, gain = diagnosis.verdict, diagnosis.budget, diagnosis.gain
+    least = max(verdict.probabilities.values()) * np.exp(-BESIDE)
     others = [
         {"ids": sorted(s), "probability": _round(p)}
         for s, p in verdict.probabilities.items()
-        if s != verdict.standing and p >= 5e-4
+        if s != verdict.standing and p >= least
     ]
     content: dict[str, Any] = {
         "verdict": verdict.word,
         "causes": [_cause(diagnosis, e, seed) for e in diagnosis.causes],
-        "alternatives": others[: LISTED if verdict.word == "ambiguous" else 2 * LISTED],
+        "alternatives": others[: 2 * LISTED],
         "not_tested": [{"id": i, "why": why} for i, why in diagnosis.candidates.not_tested],
         "noise_N": _round(budget.noise),
         "misfit_before_N": _round(budget.before),

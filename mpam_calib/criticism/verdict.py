@@ -19,6 +19,8 @@ SURE, LEAD = 0.95, 5.0
 STANDS = 20.0
 """The same for a cause beside structure that no set removes: odds of models that are known to be wrong."""
 LISTED = 5
+BESIDE = 10.0
+"""Nats below the likeliest set down to which others are told beside it: these data hardly separate them."""
 NOISE_SIZE = 0.5
 """A remainder whose root mean square is below this share of a reading's noise is at its level."""
 REPEAT_SIZE = 0.2

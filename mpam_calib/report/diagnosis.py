@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mpam_calib.criticism.diagnose import Diagnosis
+from mpam_calib.criticism.verdict import BESIDE
 from mpam_calib.model.bend import FORM
 from mpam_calib.model.effect import effect
 from mpam_calib.report import wording
@@ -201,7 +202,7 @@ def _meaning(identifier: str, form: str) -> str:
 
 def _alternatives(content: dict[str, Any]) -> list[Block]:
     if not content["alternatives"]:
-        return [Text("No other set of causes has a probability above 0.0005.")]
+        return [Text(f"No other set of causes comes within {BESIDE:g} nats of the likeliest.")]
     rows = [
         {
             "set": ", ".join(a["ids"]) or "nothing beyond the declared simulation",
