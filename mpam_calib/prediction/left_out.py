@@ -67,7 +67,10 @@ def levels_left_out(specimen: Specimen, target: Collapsed, draws: Draws, seed: i
             continue
         fold = without_level(specimen, target, int(level))
         rng = np.random.default_rng([seed, 11, int(level)])
-        force, seen = _predict(fold, _reweighted(fold, thinned, whole, rng), held.places, rng)
+        u = _reweighted(fold, thinned, whole, rng)
+        if u is None:
+            continue
+        force, seen = _predict(fold, u, held.places, rng)
         low, high = np.quantile(seen, [0.05, 0.95], axis=0)
         miss = held.force - force.mean(axis=0)
         rows.append(
@@ -111,8 +114,8 @@ def _likelihood(target: Collapsed, draws: Draws) -> Array:
     return np.concatenate([target.log_likelihood(target.model.values(u)) for u in parts])
 
 
-def _reweighted(fold: Collapsed, draws: Draws, whole: Array, rng: np.random.Generator) -> Array:
-    """Coordinates (N, d) drawn from the posterior without the level."""
+def _reweighted(fold: Collapsed, draws: Draws, whole: Array, rng: np.random.Generator) -> Array | None:
+    """Coordinates (N, d) drawn from the posterior without the level; None where none can be found."""
     import arviz as az
 
     ratio = _likelihood(fold, draws) - whole
@@ -123,7 +126,9 @@ def _reweighted(fold: Collapsed, draws: Draws, whole: Array, rng: np.random.Gene
     mixture = laplace_mixture(climb_modes(fold, [start, draws.u.mean(axis=0)]))
     proposed = mixture.draw(PROPOSED, np.random.RandomState(int(rng.integers(2**31))))
     ratio = evaluate(fold, proposed) - mixture.log_density(proposed)
-    weight, _ = az.psislw(ratio)
+    if not np.isfinite(ratio).any():
+        return None
+    weight, _ = az.psislw(np.where(np.isfinite(ratio), ratio, -np.inf))
     return proposed[rng.choice(PROPOSED, len(draws), p=np.exp(weight))]
 
 
