@@ -27,11 +27,14 @@ SMOOTH, ROUGH = "remainder_sd_N", "stroke_remainder_sd_N"
 
 
 def remainder_parameters(setting: Setting, strokes: bool) -> tuple[Parameter, ...]:
-    """Amplitudes (N): a priori half a percent of the force scale, and less for a single stroke."""
+    """Amplitudes (N): a priori 0.3 percent of the force scale, and a fifth of that for a single stroke.
+
+    Either may be e⁴ times as large, or as small: where the physics is right nothing widens the bands.
+    """
     scale = setting.force_scale
-    found = [Parameter(SMOOTH, LogNormal(0.01 * scale, 1.0), "size of what the physics leaves")]
+    found = [Parameter(SMOOTH, LogNormal(0.003 * scale, 2.0), "size of what the physics leaves")]
     if strokes:
-        found.append(Parameter(ROUGH, LogNormal(0.002 * scale, 1.0), "the same, for one stroke alone"))
+        found.append(Parameter(ROUGH, LogNormal(0.0006 * scale, 2.0), "the same, for one stroke alone"))
     return tuple(found)
 
 

@@ -106,7 +106,7 @@ def _climb_held(start: Array) -> tuple[Array, float]:
 def _structured(target: Collapsed, u: Array) -> Array:
     """A start that takes the misfit for structure (little noise, a large remainder), not for noise."""
     other = u.copy()
-    for name, shift in ((WHITE, -1.5), (NOISE, -1.5), (SMOOTH, 2.0), (MISFIT, 2.0)):
+    for name, shift in ((WHITE, -1.5), (NOISE, -1.5), (SMOOTH, 1.5), (MISFIT, 2.0)):
         if name in target.model.names:
             other[target.model.names.index(name)] = shift
     return other
