@@ -28,6 +28,8 @@ NEWTON_REACH = 0.5
 """Standard deviations over which differences are taken."""
 NEWTON_STEPS, NEWTON_GAIN, SHORTER = 6, 0.005, (1.0, 0.5, 0.2, 0.05)
 """Newton steps at most, the gain (nats) below which they end, and shares of a step that are tried."""
+STEEPEST = 1e12
+"""Information beyond which differences over the axes saw another hillside, not the mode's own width."""
 HARSHEST = 1e14
 """Information on the moduli, in their priors', beyond which the priors are lost to rounding."""
 SAME = 1e-11
@@ -155,7 +157,10 @@ class Hypothesis:
             hessian[i, j] = hessian[j, i] = 0.5 * (both + 2.0 * top - (up + down)[i] - (up + down)[j])
             back = np.linalg.inv(axes)
             values, turns = np.linalg.eigh(-(back.T @ hessian @ back) / NEWTON_REACH**2)
-            covariance = (turns / np.maximum(values, LOOSEST)) @ turns.T
+            if values[-1] > STEEPEST:
+                return None
+            shorter = turns / np.sqrt(np.maximum(values, LOOSEST))
+            covariance = shorter @ shorter.T
             step = covariance @ (back.T @ (up - down)) / (2.0 * NEWTON_REACH)
             gain = 0.5 * float(step @ (back.T @ (up - down))) / (2.0 * NEWTON_REACH)
             if gain < NEWTON_GAIN:
@@ -165,7 +170,7 @@ class Hypothesis:
             # Where no step leads uphill, the axes were too long for their slopes: these are shorter.
             if reached.max() > top:
                 u = tried[int(reached.argmax())]
-            axes = np.linalg.cholesky(covariance)
+            axes = shorter
         return None
 
     def _climbed(self, start: Array) -> Mode:

@@ -72,6 +72,25 @@ def test_wider_priors_are_the_priors_widened(problem: Problem) -> None:
     assert after == pytest.approx(before, rel=0.02)
 
 
+class Walled(Hypothesis):
+    """Narrow in one direction: beyond a fiftieth of a prior sd the density falls off a cliff."""
+
+    def log_posterior(self, u: np.ndarray) -> np.ndarray:
+        across = u @ np.array([0.6, -0.64, 0.48])
+        return -0.5 * np.sum(u**2, axis=1) - 0.01 * (np.cosh(np.clip(80.0 * across, -300.0, 300.0)) - 1.0)
+
+
+def test_axes_that_reach_over_a_cliff_still_lead_to_the_mode(problem: Problem) -> None:
+    """Differences over such axes say 10¹⁵ and more of the information, of which a Cholesky root is lost."""
+    blueprint = declared(problem, friction="coulomb", order=2, law="exponential")
+    found = fit(problem, frozenset(), 0, None, blueprint)
+    found = replace(found, u=np.array([0.4, 0.4, 0.0]), covariance=np.eye(len(found.covariance)))
+    mode = Walled(problem, blueprint, found).mode()
+    assert mode.u == pytest.approx(np.zeros(3), abs=0.05)
+    assert np.linalg.eigvalsh(mode.covariance)[0] > 0.0
+    assert np.isfinite(mode.log_evidence)
+
+
 def test_one_dimension_against_a_dense_grid(problem: Problem) -> None:
     """K_f alone: within 0.02 nat where it is seen, within 0.1 where the loops were made without friction."""
     blueprint = declared(problem, friction="coulomb", order=3, law="linear", effects=())
