@@ -1,4 +1,4 @@
-"""Evidence of the leading models beyond Laplace: quadrature, bridge sampling, other prior widths.
+"""Evidence of the leading models beyond Laplace: quadrature or annealing, bridges, other prior widths.
 
 Each works on a model's fits, one for each size of the remainder, and sums over the sizes.
 """
@@ -16,6 +16,7 @@ from mpam_calib.criticism.fit import Fit
 from mpam_calib.criticism.hypothesis import Hypothesis
 from mpam_calib.criticism.problem import SIZE_PRIOR, Problem
 from mpam_calib.model.blueprint import Blueprint
+from mpam_calib.posterior.annealed import anneal
 from mpam_calib.posterior.bridge import Bridge, bridge_evidence
 from mpam_calib.posterior.evidence import Evidence, integrate
 from mpam_calib.posterior.mode import Mode
@@ -25,7 +26,7 @@ Array = NDArray[np.float64]
 NEGLIGIBLE, NEGLIGIBLE_ELSEWHERE = 5.0, 8.0
 """Nats below the best size at which Laplace's figure will do; and at which other priors are not tried."""
 SETTLES = 7
-"""Parameters up to which the rule of quadrature settles; in more it is left at Laplace's figure."""
+"""Parameters up to which the rule of quadrature settles; with more a crowd of points is annealed."""
 AS_DECLARED = (1.0, 1.0)
 WIDTHS = {
     "as declared": AS_DECLARED,
@@ -45,35 +46,74 @@ class Weighed:
     bridge: Bridge
 
 
-def log_evidence_by_quadrature(
-    problem: Problem, blueprint: Blueprint, fits: list[Fit], widths: tuple[float, float] = AS_DECLARED
-) -> float:
-    """Log evidence, summed over the remainder's sizes; ``widths`` as in WIDTHS."""
-    return float(np.logaddexp.reduce(list(_sizes(problem, blueprint, fits, widths)[0].values())))
+def log_evidence_beyond_laplace(
+    problem: Problem, blueprint: Blueprint, fits: list[Fit], close: bool = True
+) -> tuple[float, float]:
+    """Log evidence, summed over the remainder's sizes, and its standard error.
+
+    Of more than SETTLES parameters Laplace's at the density's own mode, unless ``close`` to the best.
+    """
+    terms, inner = _sizes(problem, blueprint, fits, integrated=close or not many_parameters(fits))
+    value = float(np.logaddexp.reduce(list(terms.values())))
+    return value, _error(terms, {size: found.error for size, (_, found) in inner.items()})
 
 
 def weigh(problem: Problem, blueprint: Blueprint, fits: list[Fit], seed: int) -> Weighed:
-    """Quadrature and, for the sizes that matter, a bridge; an infinite error where none could be built."""
-    terms, inner = _sizes(problem, blueprint, fits, AS_DECLARED)
+    """Quadrature and, for the sizes that matter, a bridge; an infinite error where none could be built.
+
+    For models of at most SETTLES parameters.
+    """
+    terms, inner = _sizes(problem, blueprint, fits)
     quadrature = float(np.logaddexp.reduce(list(terms.values())))
     if not inner:
         return Weighed(quadrature, Bridge(quadrature, float("inf")))
-    bridged, variance = dict(terms), 0.0
-    for size, (hypothesis, found) in inner.items():
-        value, error = bridge_evidence(hypothesis, found, seed)
-        bridged[size] = value + log(SIZE_PRIOR[size])
-        variance += (float(np.exp(terms[size] - quadrature)) * error) ** 2
-    value = float(np.logaddexp.reduce(list(bridged.values())))
-    return Weighed(quadrature, Bridge(value, float(np.sqrt(variance))))
+    bridges = {size: bridge_evidence(density, found, seed) for size, (density, found) in inner.items()}
+    error = _error(terms, {size: bridge.error for size, bridge in bridges.items()})
+    terms |= {size: bridge.value + log(SIZE_PRIOR[size]) for size, bridge in bridges.items()}
+    return Weighed(quadrature, Bridge(float(np.logaddexp.reduce(list(terms.values()))), error))
+
+
+def under_other_priors(problem: Problem, blueprint: Blueprint, fits: list[Fit], known: float) -> list[float]:
+    """Log evidence for each of WIDTHS; ``known`` is that under the declared ones.
+
+    Of many parameters Laplace's approximation says how it changes, though not how large it is.
+    """
+
+    def total(widths: tuple[float, float], anew: bool) -> float:
+        return float(np.logaddexp.reduce(list(_sizes(problem, blueprint, fits, widths, anew)[0].values())))
+
+    if many_parameters(fits):
+        laplace = np.array([total(widths, False) for widths in WIDTHS.values()])
+        return list(known + laplace - laplace[list(WIDTHS.values()).index(AS_DECLARED)])
+    return [known if widths == AS_DECLARED else total(widths, True) for widths in WIDTHS.values()]
+
+
+def many_parameters(fits: list[Fit]) -> bool:
+    """Whether a model has more parameters than quadrature settles for."""
+    return len(fits[0].u) > SETTLES
+
+
+def _error(terms: dict[int, float], errors: dict[int, float]) -> float:
+    """Error of the sum of terms, of which some have errors (none: not known)."""
+    total = np.logaddexp.reduce(list(terms.values()))
+    parts = [float(np.exp(terms[size] - total)) * error for size, error in errors.items()]
+    return float(np.linalg.norm(parts)) if parts else float("nan")
 
 
 def _sizes(
-    problem: Problem, blueprint: Blueprint, fits: list[Fit], widths: tuple[float, float]
+    problem: Problem,
+    blueprint: Blueprint,
+    fits: list[Fit],
+    widths: tuple[float, float] = AS_DECLARED,
+    integrated: bool = True,
 ) -> tuple[dict[int, float], dict[int, tuple[Hypothesis, Evidence]]]:
-    """Terms of the sum by size, and the densities behind those that were integrated."""
+    """Terms of the sum by size, and the densities behind those that were integrated.
+
+    ``widths`` as in WIDTHS; without ``integrated`` all terms are Laplace's.
+    """
     terms = {f.size: f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits}
     best = max(terms.values())
-    declared = widths == AS_DECLARED
+    declared, many = widths == AS_DECLARED, many_parameters(fits)
     # Under other priors the fits' own evidences say only roughly which sizes matter.
     within = NEGLIGIBLE if declared else NEGLIGIBLE_ELSEWHERE
     modes: dict[int, tuple[Hypothesis, Mode]] = {}
@@ -81,21 +121,23 @@ def _sizes(
         if terms[found.size] < best - within:
             continue
         hypothesis = Hypothesis(problem, blueprint, found, *widths)
-        few = len(hypothesis.parameters) <= SETTLES
-        mode = hypothesis.fitted_mode() if declared and few else hypothesis.mode()
+        anew = many or not declared
+        mode = hypothesis.mode() if anew else hypothesis.fitted_mode()
         modes[found.size] = hypothesis, mode
-        if not (declared and few):
+        if anew:
             terms[found.size] = mode.log_evidence + log(SIZE_PRIOR[found.size])
     terms = {size: value for size, value in terms.items() if declared or size in modes}
-    best = max(terms.values())
     inner: dict[int, tuple[Hypothesis, Evidence]] = {}
-    for size, (hypothesis, mode) in modes.items():
-        if terms[size] < best - NEGLIGIBLE or len(mode.u) > SETTLES:
-            continue
-        integral = integrate(hypothesis, mode)
-        if integral.reliable:
+    best = -np.inf
+    # The largest first: of many parameters Laplace may say several nats too much.
+    for size in sorted(modes, key=lambda s: -terms[s]):
+        if terms[size] < best - NEGLIGIBLE or not integrated:
+            break
+        integral = (anneal if many else integrate)(*modes[size])
+        if many or integral.reliable:
             terms[size] = integral.value + log(SIZE_PRIOR[size])
-            inner[size] = hypothesis, integral
+            inner[size] = modes[size][0], integral
+        best = max(best, terms[size])
     return terms, inner
 
 

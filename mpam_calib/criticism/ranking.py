@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from mpam_calib.criticism.evidence import SETTLES, log_evidence_by_quadrature
+from mpam_calib.criticism.evidence import SETTLES, log_evidence_beyond_laplace
 from mpam_calib.criticism.fit import Fit, chain_for, fit
 from mpam_calib.criticism.noise_scale import settle_noise
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
@@ -26,9 +26,10 @@ from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.moduli import rate_names
 from mpam_calib.specimen.declaration import Simulation
 
-NEAR, LEADING = 50.0, 20.0
-"""Nats below the best within which quadrature replaces Laplace's evidence; and within which it does so for
-SETTLES parameters (bent ones take a minute), and the mode and curvature of the density itself for more."""
+NEAR, LEADING, CLOSE = 50.0, 20.0, 8.0
+"""Nats below the best within which quadrature replaces Laplace's evidence; within which it does so for
+SETTLES parameters (bent ones take a minute), and the density's own mode and curvature for more; and within
+which models of more are annealed."""
 PROMISING = 60.0
 """Nats below the best model so far within which a law's rates are searched for all their modes."""
 AGAIN = 4
@@ -48,7 +49,7 @@ Start = dict[str, float]
 class Ranked:
     """A model with its fits (one for each size of the remainder) and its log evidence (nats).
 
-    ``error`` is the evidence's standard error, where a bridge gave one.
+    ``error`` is the evidence's standard error, where it is more than Laplace's.
     """
 
     simulation: Simulation
@@ -107,9 +108,8 @@ def rank_spread(
         for i, r in enumerate(ranked)
         if r.log_evidence >= top - (NEAR if len(r.best.u) < SETTLES else LEADING) or always(r.simulation)
     ]
-    for number, (i, better) in enumerate(
-        zip(wanted, spread(integrated, [ranked[i] for i in wanted]), strict=True)
-    ):
+    asked = [(ranked[i], ranked[i].log_evidence >= top - CLOSE) for i in wanted]
+    for number, (i, better) in enumerate(zip(wanted, spread(integrated, asked), strict=True)):
         ranked[i] = better
         tell("integrating", (number + 1) / len(wanted))
     return sorted(ranked, key=lambda r: -r.log_evidence)
@@ -167,11 +167,13 @@ def _ranked(problem: Problem, simulation: Simulation, fits: list[Fit]) -> Ranked
     return Ranked(simulation, fits, float(np.logaddexp.reduce(terms)), ceiling=max(reached))
 
 
-def integrated(ranked: Ranked) -> Ranked:
-    """The model with its evidence by quadrature, on the held problem."""
+def integrated(task: tuple[Ranked, bool]) -> Ranked:
+    """The model with its evidence by quadrature, on the held problem; if ``close``, or else by annealing."""
+    ranked, close = task
     problem = held_problem()
-    value = log_evidence_by_quadrature(problem, blueprint_of(problem, ranked.simulation), ranked.fits)
-    return replace(ranked, log_evidence=value)
+    blueprint = blueprint_of(problem, ranked.simulation)
+    value, error = log_evidence_beyond_laplace(problem, blueprint, ranked.fits, close)
+    return replace(ranked, log_evidence=value, error=error)
 
 
 def _climbs(

@@ -2,7 +2,8 @@
 
 By evidence (summed over the remainder's sizes) and by whole pressure levels held out; with a confusion
 matrix that says how often the leading models would be told apart with data like these. Laplace's evidence
-ranks the whole space, quadrature those near the top, and bridge sampling gives the leading ones an error.
+ranks the whole space, quadrature or annealing those near the top, and bridge sampling gives the leading
+ones an error.
 """
 
 from __future__ import annotations
@@ -15,11 +16,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mpam_calib.criticism.evidence import (
-    AS_DECLARED,
-    WIDTHS,
     Weighed,
-    log_evidence_by_quadrature,
+    many_parameters,
     prior_sensitivity,
+    under_other_priors,
     weigh,
 )
 from mpam_calib.criticism.held_out import LEVEL_COLUMNS, hold_out, hold_out_each
@@ -31,6 +31,7 @@ from mpam_calib.criticism.space import model_space
 from mpam_calib.criticism.spread import held_problem, spread_over
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
+from mpam_calib.posterior.bridge import Bridge
 from mpam_calib.specimen.declaration import Simulation
 from mpam_calib.specimen.recording import Specimen
 
@@ -101,9 +102,8 @@ def select(
         ranked.sort(key=lambda r: -r.log_evidence)
         leading = ranked[:CONFUSED]
         listener("other priors", 0.0)
-        widened = np.array(
-            list(spread(_widen, [(r, known.get(r.simulation.model_dump_json())) for r in leading]))
-        )
+        before = [known.get(r.simulation.model_dump_json(), r.log_evidence) for r in leading]
+        widened = np.array(list(spread(_widen, list(zip(leading, before, strict=True)))))
         listener("holding out", 0.0)
         held = list(spread(hold_out, ranked[:HELD_OUT]))
         chosen = _apart(ranked, held, declared)
@@ -125,6 +125,8 @@ def select(
 
 def _weigh(task: tuple[Ranked, int]) -> Weighed:
     ranked, seed = task
+    if many_parameters(ranked.fits):
+        return Weighed(ranked.log_evidence, Bridge(ranked.log_evidence, ranked.error))
     problem = held_problem()
     return weigh(problem, blueprint_of(problem, ranked.simulation), ranked.fits, seed)
 
@@ -136,17 +138,11 @@ def _bridged(ranked: Ranked, weighed: Weighed) -> Ranked:
     return replace(ranked, log_evidence=weighed.bridge.value, error=weighed.bridge.error)
 
 
-def _widen(task: tuple[Ranked, float | None]) -> list[float]:
-    """Log evidence for each of WIDTHS; the first may be known already."""
+def _widen(task: tuple[Ranked, float]) -> list[float]:
+    """Log evidence for each of WIDTHS; ``known`` is that under the declared ones."""
     ranked, known = task
     problem = held_problem()
-    blueprint = blueprint_of(problem, ranked.simulation)
-    return [
-        known
-        if known is not None and widths == AS_DECLARED
-        else log_evidence_by_quadrature(problem, blueprint, ranked.fits, widths)
-        for widths in WIDTHS.values()
-    ]
+    return under_other_priors(problem, blueprint_of(problem, ranked.simulation), ranked.fits, known)
 
 
 def _confuse(task: tuple[Ranked, list[Ranked], int, int, int]) -> Array:

@@ -121,7 +121,7 @@ def choices_section(odds: pd.DataFrame, levels: pd.DataFrame) -> Section:
     return Section(
         "Orders, laws and levels",
         blocks,
-        "Odds compare evidence: how probable each made these readings before it saw them. Models with more "
-        "than seven parameters beside the moduli (a rate for each modulus) have Laplace's approximation, "
-        "which may be off by several nats.",
+        "Odds compare evidence: how probable each made these readings before it saw them. With "
+        "more than seven parameters beside the moduli (a rate for each modulus) it may be off by several "
+        "nats: see its error in the ranking.",
     )

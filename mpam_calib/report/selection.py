@@ -56,7 +56,8 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
                 DataTable(models.head(SHOWN), "Best first", ranks),
                 Text(
                     "Evidence of the leading models is by bridge sampling, with its error; quadrature "
-                    f"differs from it by at most {found.disagreement:.2g} nats. Models far below have "
+                    f"differs from it by at most {found.disagreement:.2g} nats. That of models with a rate "
+                    "for each modulus is known less well. Models without an error lie far below and have "
                     "Laplace's approximation."
                 ),
             ],

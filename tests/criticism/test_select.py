@@ -34,8 +34,9 @@ def test_the_simulated_model_comes_first(monkeypatch: pytest.MonkeyPatch) -> Non
     assert models["probability"].sum() == pytest.approx(1.0)
     assert found.confusion.shape == (2, 2)
     np.testing.assert_allclose(found.confusion.sum(axis=1), 1.0)
-    # The leading models have an error of their evidence, and figures under other priors; no other has.
-    assert models["log_evidence_se"].notna().tolist() == [True] * 2 + [False] * (len(models) - 2)
+    # The leading models have an error of their evidence, and figures under other priors; Laplace's have none.
+    behind = models["log_evidence"] < models["log_evidence"].max() - 2.0 * ranking.NEAR
+    assert models["log_evidence_se"][behind].isna().mean() > 0.5
     assert models["log_evidence_se"].iloc[:2].between(0.0, 0.1).all()
     assert len(found.sensitivity) == 2 * 5
     assert found.disagreement < 0.2

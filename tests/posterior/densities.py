@@ -95,6 +95,16 @@ class Sheet:
         return self.exact + stats.norm.logpdf(z).sum(axis=1) + stats.norm.logpdf(y, at, 0.02).sum(axis=1)
 
 
+@dataclass(frozen=True)
+class Sheets:
+    """Two independent sheets: twelve dimensions, ln Z = 3."""
+
+    exact: float = 2.0 * Sheet.exact
+
+    def log_posterior(self, u: Array) -> Array:
+        return Sheet().log_posterior(u[:, :6]) + Sheet().log_posterior(u[:, 6:])
+
+
 KNOWN = {
     "gaussian": Gaussian(),
     "skewed": Skewed(),
@@ -114,5 +124,5 @@ def mode_of(density: object, dimensions: int) -> Mode:
 def dimensions_of(density: object) -> int:
     return {
         Gaussian: lambda d: d.dimensions, Skewed: lambda d: len(d.shapes),
-        Bounded: lambda d: len(d.y), Curved: lambda d: 2, Sheet: lambda d: 6,
+        Bounded: lambda d: len(d.y), Curved: lambda d: 2, Sheet: lambda d: 6, Sheets: lambda d: 12,
     }[type(density)](density)  # fmt: skip
