@@ -40,6 +40,21 @@ def test_the_script_writes_the_bundled_files_byte_for_byte(tmp_path: Path) -> No
         assert path.read_bytes() == (DATASETS / path.relative_to(tmp_path)).read_bytes(), path.name
 
 
+def test_three_physical_corrections_predict_mpam1_between_levels_as_eight_moduli_do_not(
+    tmp_path: Path,
+) -> None:
+    """Beside tensile moduli, against the thesis's joint linear law, with whose form they were computed."""
+    all_data = script("diagnose_all")
+    bare = all_data.read(all_data.bare("mpam1_reconstructed", tmp_path / "bare"))
+    physical = ["coulomb_friction", "length_offset", "wall_pressure"]
+    corrected = all_data.left_out(all_data.with_effects(bare, physical))
+    moduli = all_data.left_out(all_data.read(DATASETS / "mpam1_reconstructed"))
+    assert all_data.left_out(bare).between > 5.0
+    assert corrected.between < 0.75 * moduli.between
+    assert corrected.rmse < 1.1 * moduli.rmse
+    assert corrected.coverage > 0.8
+
+
 def test_tables_keep_their_misprints() -> None:
     assert table("4.3").text("50", "E_4 (Pa)") == table("4.3").text("50", "E_2 (Pa)") == "-1.0822e8"
     assert table("3.5").text("100", "Cost function (Case I)") == "39.70377"
