@@ -47,13 +47,13 @@ class Weighed:
 
 
 def log_evidence_beyond_laplace(
-    problem: Problem, blueprint: Blueprint, fits: list[Fit], close: bool = True
+    problem: Problem, blueprint: Blueprint, fits: list[Fit], worth: float = -np.inf
 ) -> tuple[float, float]:
     """Log evidence, summed over the remainder's sizes, and its standard error.
 
-    Of more than SETTLES parameters Laplace's at the density's own mode, unless ``close`` to the best.
+    Of more than SETTLES parameters Laplace's at the density's own mode where that is not ``worth`` more.
     """
-    terms, inner = _sizes(problem, blueprint, fits, integrated=close or not many_parameters(fits))
+    terms, inner = _sizes(problem, blueprint, fits, worth=worth if many_parameters(fits) else -np.inf)
     value = float(np.logaddexp.reduce(list(terms.values())))
     return value, _error(terms, {size: found.error for size, (_, found) in inner.items()})
 
@@ -79,13 +79,13 @@ def under_other_priors(problem: Problem, blueprint: Blueprint, fits: list[Fit], 
     Of many parameters Laplace's approximation says how it changes, though not how large it is.
     """
 
-    def total(widths: tuple[float, float], anew: bool) -> float:
-        return float(np.logaddexp.reduce(list(_sizes(problem, blueprint, fits, widths, anew)[0].values())))
+    def total(widths: tuple[float, float], worth: float = -np.inf) -> float:
+        return float(np.logaddexp.reduce(list(_sizes(problem, blueprint, fits, widths, worth)[0].values())))
 
     if many_parameters(fits):
-        laplace = np.array([total(widths, False) for widths in WIDTHS.values()])
+        laplace = np.array([total(widths, worth=np.inf) for widths in WIDTHS.values()])
         return list(known + laplace - laplace[list(WIDTHS.values()).index(AS_DECLARED)])
-    return [known if widths == AS_DECLARED else total(widths, True) for widths in WIDTHS.values()]
+    return [known if widths == AS_DECLARED else total(widths) for widths in WIDTHS.values()]
 
 
 def many_parameters(fits: list[Fit]) -> bool:
@@ -105,14 +105,14 @@ def _sizes(
     blueprint: Blueprint,
     fits: list[Fit],
     widths: tuple[float, float] = AS_DECLARED,
-    integrated: bool = True,
+    worth: float = -np.inf,
 ) -> tuple[dict[int, float], dict[int, tuple[Hypothesis, Evidence]]]:
     """Terms of the sum by size, and the densities behind those that were integrated.
 
-    ``widths`` as in WIDTHS; without ``integrated`` all terms are Laplace's.
+    ``widths`` as in WIDTHS; where Laplace's figures are not ``worth`` more (nats), they will do.
     """
     terms = {f.size: f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits}
-    best = max(terms.values())
+    best, laplace = max(terms.values()), np.logaddexp.reduce(list(terms.values()))
     declared, many = widths == AS_DECLARED, many_parameters(fits)
     # Under other priors the fits' own evidences say only roughly which sizes matter.
     within = NEGLIGIBLE if declared else NEGLIGIBLE_ELSEWHERE
@@ -128,10 +128,12 @@ def _sizes(
             terms[found.size] = mode.log_evidence + log(SIZE_PRIOR[found.size])
     terms = {size: value for size, value in terms.items() if declared or size in modes}
     inner: dict[int, tuple[Hypothesis, Evidence]] = {}
+    if max(laplace, np.logaddexp.reduce(list(terms.values()))) < worth:
+        return terms, inner
     best = -np.inf
     # The largest first: of many parameters Laplace may say several nats too much.
     for size in sorted(modes, key=lambda s: -terms[s]):
-        if terms[size] < best - NEGLIGIBLE or not integrated:
+        if terms[size] < best - NEGLIGIBLE:
             break
         integral = (anneal if many else integrate)(*modes[size])
         if many or integral.reliable:

@@ -108,7 +108,7 @@ def rank_spread(
         for i, r in enumerate(ranked)
         if r.log_evidence >= top - (NEAR if len(r.best.u) < SETTLES else LEADING) or always(r.simulation)
     ]
-    asked = [(ranked[i], ranked[i].log_evidence >= top - CLOSE) for i in wanted]
+    asked = [(ranked[i], top - CLOSE) for i in wanted]
     for number, (i, better) in enumerate(zip(wanted, spread(integrated, asked), strict=True)):
         ranked[i] = better
         tell("integrating", (number + 1) / len(wanted))
@@ -167,12 +167,12 @@ def _ranked(problem: Problem, simulation: Simulation, fits: list[Fit]) -> Ranked
     return Ranked(simulation, fits, float(np.logaddexp.reduce(terms)), ceiling=max(reached))
 
 
-def integrated(task: tuple[Ranked, bool]) -> Ranked:
-    """The model with its evidence by quadrature, on the held problem; if ``close``, or else by annealing."""
-    ranked, close = task
+def integrated(task: tuple[Ranked, float]) -> Ranked:
+    """The model with its evidence by quadrature, or by annealing if it is ``worth`` that (nats)."""
+    ranked, worth = task
     problem = held_problem()
     blueprint = blueprint_of(problem, ranked.simulation)
-    value, error = log_evidence_beyond_laplace(problem, blueprint, ranked.fits, close)
+    value, error = log_evidence_beyond_laplace(problem, blueprint, ranked.fits, worth)
     return replace(ranked, log_evidence=value, error=error)
 
 
