@@ -27,6 +27,7 @@ NEGLIGIBLE, NEGLIGIBLE_ELSEWHERE = 5.0, 8.0
 """Nats below the best size at which Laplace's figure will do; and at which other priors are not tried."""
 SETTLES = 7
 """Parameters up to which the rule of quadrature settles; with more a crowd of points is annealed."""
+OWN_RATES = "exponential_each"
 AS_DECLARED = (1.0, 1.0)
 WIDTHS = {
     "as declared": AS_DECLARED,
@@ -51,9 +52,11 @@ def log_evidence_beyond_laplace(
 ) -> tuple[float, float]:
     """Log evidence, summed over the remainder's sizes, and its standard error.
 
-    Of more than SETTLES parameters Laplace's at the density's own mode where that is not ``worth`` more.
+    With many parameters, or rates of each modulus's own, that takes long: where the evidence at the density's
+    own mode is not ``worth`` it (nats), Laplace's figure there will do.
     """
-    terms, inner = _sizes(problem, blueprint, fits, worth=worth if many_parameters(fits) else -np.inf)
+    slow = many_parameters(fits) or blueprint.simulation.law == OWN_RATES
+    terms, inner = _sizes(problem, blueprint, fits, worth=worth if slow else -np.inf)
     value = float(np.logaddexp.reduce(list(terms.values())))
     return value, _error(terms, {size: found.error for size, (_, found) in inner.items()})
 
@@ -114,6 +117,7 @@ def _sizes(
     terms = {f.size: f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits}
     best, laplace = max(terms.values()), np.logaddexp.reduce(list(terms.values()))
     declared, many = widths == AS_DECLARED, many_parameters(fits)
+    anew = many or not declared or blueprint.simulation.law == OWN_RATES
     # Under other priors the fits' own evidences say only roughly which sizes matter.
     within = NEGLIGIBLE if declared else NEGLIGIBLE_ELSEWHERE
     modes: dict[int, tuple[Hypothesis, Mode]] = {}
@@ -121,7 +125,6 @@ def _sizes(
         if terms[found.size] < best - within:
             continue
         hypothesis = Hypothesis(problem, blueprint, found, *widths)
-        anew = many or not declared
         mode = hypothesis.mode() if anew else hypothesis.fitted_mode()
         modes[found.size] = hypothesis, mode
         if anew:

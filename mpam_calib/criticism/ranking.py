@@ -28,8 +28,8 @@ from mpam_calib.specimen.declaration import Simulation
 
 NEAR, LEADING, CLOSE = 50.0, 20.0, 8.0
 """Nats below the best within which quadrature replaces Laplace's evidence; within which it does so for
-SETTLES parameters (bent ones take a minute), and the density's own mode and curvature for more; and within
-which models of more are annealed."""
+SETTLES parameters, and the density's own mode and curvature for more; and within which models that take long
+(more parameters, or rates of each modulus's own) are integrated or annealed."""
 PROMISING = 60.0
 """Nats below the best model so far within which a law's rates are searched for all their modes."""
 AGAIN = 4
@@ -168,7 +168,7 @@ def _ranked(problem: Problem, simulation: Simulation, fits: list[Fit]) -> Ranked
 
 
 def integrated(task: tuple[Ranked, float]) -> Ranked:
-    """The model with its evidence by quadrature, or by annealing if it is ``worth`` that (nats)."""
+    """The model with its evidence by quadrature or annealing; what takes long, if ``worth`` it (nats)."""
     ranked, worth = task
     problem = held_problem()
     blueprint = blueprint_of(problem, ranked.simulation)
