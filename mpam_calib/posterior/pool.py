@@ -41,11 +41,15 @@ def _adopt(target: Collapsed) -> None:
 
 def settle_worker() -> None:
     """Let a forked process work by itself, and die with its parent."""
-    # One thread each: the work is parallel already, and sums must not depend on the machine.
-    threadpool_limits(1)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)
+        # A parent that was killed before this line will send nothing any more.
+        parent = multiprocessing.parent_process()
+        if parent is not None and os.getppid() != parent.pid:
+            os._exit(1)
         _keep_freed_memory()
+    # One thread each: the work is parallel already, and sums must not depend on the machine.
+    threadpool_limits(1)
 
 
 def _keep_freed_memory() -> None:

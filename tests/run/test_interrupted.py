@@ -94,6 +94,33 @@ def test_a_run_killed_at_any_moment_is_resumed(
     resume(muscle, folder, whole)
 
 
+LATE = """
+import multiprocessing, time
+from mpam_calib.posterior.pool import settle_worker
+
+def work():
+    time.sleep(1.0)
+    settle_worker()
+    time.sleep(100.0)
+
+multiprocessing.get_context("fork").Process(target=work).start()
+print("started", flush=True)
+time.sleep(100.0)
+"""
+
+
+def test_a_worker_whose_parent_was_killed_before_it_began_ends() -> None:
+    """In the moment between its fork and its first line it does not yet die with its parent."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", LATE], stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "started\n"
+    kill(process)
+    assert living(process.pid)
+    assert all_gone(process.pid, 30.0)
+
+
 def test_a_killed_worker_ends_the_run_and_keeps_what_was_drawn(muscle: Path, tmp_path: Path) -> None:
     """As the kernel does where memory runs out: nobody waits for what will never come."""
     folder = tmp_path / "run"
