@@ -34,6 +34,8 @@ BEST = 2.38
 MOVES = (1.0, 0.5, 0.2, 0.8) * 2
 """... and the moves between two steps, in that length."""
 JITTER = 1e-5
+STEPS, SHORTEST = 30, 1e-12
+"""Steps at most, the last of which takes all that is left; and the least of β that one takes."""
 
 
 def anneal(density: Density, mode: Mode, seed: int = 0) -> Evidence:
@@ -41,8 +43,10 @@ def anneal(density: Density, mode: Mode, seed: int = 0) -> Evidence:
     rng = np.random.RandomState(np.random.SeedSequence([seed, 12]).generate_state(1)[0])
     points = _Points.drawn(density, mode, rng)
     reached, log_z = 0.0, np.zeros(CROWDS)
-    while reached < 1.0:
-        further = _next(reached, points.log_p - points.log_q)
+    for number in range(STEPS):
+        if reached == 1.0:
+            break
+        further = _next(reached, points.log_p - points.log_q) if number < STEPS - 1 else 1.0
         log_weight = ((further - reached) * (points.log_p - points.log_q)).reshape(CROWDS, POINTS)
         log_z += special.logsumexp(log_weight, axis=1) - np.log(POINTS)
         points.keep(_resampled(special.softmax(log_weight, axis=1), rng))
@@ -105,7 +109,7 @@ def _next(reached: float, ratio: Array) -> float:
 
     if spare(1.0) >= 0.0:
         return 1.0
-    return float(optimize.brentq(spare, reached, 1.0, xtol=1e-12))
+    return max(float(optimize.brentq(spare, reached, 1.0, xtol=SHORTEST)), reached + SHORTEST)
 
 
 def _resampled(weight: Array, rng: np.random.RandomState) -> NDArray[np.int64]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from mpam_calib.posterior.annealed import anneal
+from mpam_calib.posterior.mode import Mode
 
 from .densities import Gaussian, Sheets, Skewed, mode_of
 
@@ -32,6 +34,28 @@ def test_where_crowds_lag_the_error_says_so() -> None:
         off = abs(found.value - density.exact)
         assert off > 1.0
         assert off < 3.0 * found.error
+
+
+class Fenced:
+    """A normal density of which nine tenths of the mode's surroundings are impossible: ln Z = ln 0.1."""
+
+    edge = stats.norm.ppf(0.9)
+
+    def log_posterior(self, u: np.ndarray) -> np.ndarray:
+        return np.where(u[:, 0] < self.edge, -np.inf, stats.norm.logpdf(u).sum(axis=1))
+
+
+def test_where_most_points_are_impossible_at_first() -> None:
+    mode = Mode(np.zeros(8), 8.0 * float(stats.norm.logpdf(0.0)), np.eye(8))
+    found = anneal(Fenced(), mode, 0)
+    assert found.value == pytest.approx(np.log(0.1), abs=0.3)
+    assert found.mean[0] > Fenced.edge
+
+
+def test_a_mode_far_off_ends_with_an_error() -> None:
+    mode = Mode(np.full(8, 40.0), 0.0, 1e-4 * np.eye(8))
+    found = anneal(Gaussian(8), mode, 0)
+    assert found.error > 5.0
 
 
 def test_two_runs_are_equal_and_two_seeds_are_not() -> None:
