@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, special
 
+from mpam_calib.posterior.effective import effective_share
 from mpam_calib.posterior.evidence import Evidence
-from mpam_calib.posterior.local import effective_share
 from mpam_calib.posterior.mode import Density, Mode, evaluate
 from mpam_calib.posterior.nested import scatter
 from mpam_calib.posterior.proposal import StudentMixture

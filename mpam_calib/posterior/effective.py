@@ -1,4 +1,5 @@
-"""Rank-normalised R-hat and effective sample sizes: ArviZ's figures without the seconds its import takes.
+"""Rank-normalised R-hat and effective sample sizes: ArviZ's figures without the seconds its import takes;
+and the effective share of weighted draws.
 
 Vehtari, Gelman, Simpson, Carpenter and Bürkner 2021 (doi:10.1214/20-BA1221); Sokal's window as in emcee.
 Chains are arrays (chains, draws). Ranks are taken over all draws.
@@ -94,3 +95,8 @@ def _ess(chains: Array) -> float:
     last = max(float(rho[2 * kept]), 0.0)
     tau = max(-1.0 + 2.0 * falling.sum() + last, 1.0 / np.log10(chains.size))
     return float(chains.size / tau)
+
+
+def effective_share(log_weight: Array) -> float:
+    """Effective share of draws with these weights (Kish)."""
+    return float(1.0 / np.sum(special.softmax(log_weight) ** 2) / len(log_weight))

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import interpolate, special
 from scipy.stats import qmc
 
-from mpam_calib.posterior.local import effective_share
+from mpam_calib.posterior.effective import effective_share
 from mpam_calib.posterior.mode import Density, Mode, evaluate
 from mpam_calib.posterior.nested import Weighted, scatter, weigh_nested
 

@@ -16,12 +16,8 @@ FREEDOM = 8.0
 CLOSE_FREEDOM = 20.0
 """The same for components that were fitted to many draws; others beside them cover the tails."""
 EM_ROUNDS = 25
-PULL = 0.02
-"""Share of all draws that counts towards each component."""
-LOCAL, LOCAL_FREEDOM = 150, 5.0
-"""Components of a mixture that follows a bent posterior, and the degrees of freedom of each."""
-NEAREST = 0.1
-"""Share of the draws whose covariance is that of a local component."""
+PULL = 0.002
+"""Share of all draws that counts towards each component, as if the mean component held it."""
 
 
 @dataclass(frozen=True)
@@ -71,60 +67,43 @@ class StudentMixture:
 def fit_normals(x: Array, weight: Array, count: int) -> tuple[list[Array], list[Array], Array]:
     """Means, covariances and shares of ``count`` normal densities that together fit weighted draws (n, d).
 
-    Expectation-maximisation, begun along the axis on which the draws are most askew. Each covariance is
-    drawn a little to that of all draws, so that none collapses.
+    Expectation-maximisation, begun at draws that lie far from each other (Arthur and Vassilvitskii 2007,
+    k-means++). Each covariance is drawn a little to the mean of all components', so that none collapses; that
+    of all draws would be far too wide for pieces of a bent ridge.
     """
     centre = weight @ x
     whole = (x - centre).T @ ((x - centre) * weight[:, None]) + 1e-10 * np.eye(x.shape[1])
     if count == 1:
         return [centre], [whole], np.ones(1)
-    root = np.linalg.cholesky(whole)
-    white = np.linalg.solve(root, (x - centre).T).T
-    skew = weight @ white**3
-    axis = skew / max(float(np.linalg.norm(skew)), 1e-300)
-    along = white @ axis
-    order = np.argsort(along)
-    start = np.interp((np.arange(count) + 0.5) / count, np.cumsum(weight[order]), along[order])
-    means = centre + start[:, None] * (root @ axis)
-    covariances = np.repeat(whole[None], count, axis=0)
-    shares = np.full(count, 1.0 / count)
+    white = np.linalg.solve(np.linalg.cholesky(whole), (x - centre).T).T
+    own = weight * _near_distant_draws(white, weight, count)
+    within = whole
     for _ in range(EM_ROUNDS):
-        roots = np.linalg.cholesky(covariances)
-        z = np.linalg.solve(roots, np.swapaxes(x - means[:, None], 1, 2))
-        log_det = np.sum(np.log(np.diagonal(roots, axis1=1, axis2=2)), axis=1)
-        log = np.log(shares)[:, None] - log_det[:, None] - 0.5 * np.sum(z**2, axis=1)
-        own = weight * special.softmax(log, axis=0)
         shares = own.sum(axis=1)
-        means = (own @ x + PULL * centre) / (shares + PULL)[:, None]
+        means = own @ x / (shares + 1e-12)[:, None]
         delta = x - means[:, None]
         spread = np.swapaxes(delta, 1, 2) @ (delta * own[..., None])
-        covariances = (spread + PULL * whole) / (shares + PULL)[:, None, None]
+        covariances = (spread + PULL * within) / (shares + PULL)[:, None, None]
         shares = (shares + PULL) / (1.0 + count * PULL)
+        within = np.einsum("k,kij->ij", shares, covariances)
+        z = np.linalg.solve(np.linalg.cholesky(covariances), np.swapaxes(delta, 1, 2))
+        log_det = 0.5 * np.linalg.slogdet(covariances)[1]
+        log = np.log(shares)[:, None] - log_det[:, None] - 0.5 * np.sum(z**2, axis=1)
+        own = weight * special.softmax(log, axis=0)
     return list(means), list(covariances), shares
 
 
-def fit_local(x: Array, weight: Array, rng: np.random.RandomState, widen: float = 1.0) -> StudentMixture:
-    """A mixture that follows weighted draws (n, d) where they bend: kernels as wide as their surroundings.
-
-    The kernels stand on draws that are chosen by weight; the nearest of all draws give their covariances, and
-    ``widen`` multiplies their scale.
-    """
-    n, d = x.shape
-    centre = weight @ x
-    whole = (x - centre).T @ ((x - centre) * weight[:, None]) + 1e-10 * np.eye(d)
-    white = np.linalg.solve(np.linalg.cholesky(whole), (x - centre).T).T
-    chosen = np.searchsorted(np.cumsum(weight), (np.arange(LOCAL) + rng.uniform()) / LOCAL)
-    chosen = np.minimum(chosen, n - 1)
-    away = np.sum(white**2, axis=1) - 2.0 * white[chosen] @ white.T
-    count = min(max(int(NEAREST * n), 10 * d), n)
-    nearest = np.argpartition(away, count - 1, axis=1)[:, :count]
-    own = weight[nearest]
-    # Where a few of the draws have all the weight, the others tell the width as well.
-    own = own / own.sum(axis=1, keepdims=True) + 1.0 / count
-    own = own / own.sum(axis=1, keepdims=True)
-    delta = x[nearest] - np.einsum("kn,knd->kd", own, x[nearest])[:, None]
-    spread = np.swapaxes(delta, 1, 2) @ (delta * own[..., None]) + 1e-6 * whole
-    return StudentMixture.build(list(x[chosen]), list(widen**2 * spread), freedom=(LOCAL_FREEDOM,))
+def _near_distant_draws(white: Array, weight: Array, count: int) -> Array:
+    """Which of ``count`` draws each of the whitened ones (n, d) is next to: 0 or 1, (count, n)."""
+    rng = np.random.RandomState(0)
+    away = np.empty((count, len(white)))
+    chance = weight
+    for k in range(count):
+        chosen = white[rng.choice(len(white), p=chance / chance.sum())]
+        away[k] = np.sum((white - chosen) ** 2, axis=1)
+        chance = weight * away[: k + 1].min(axis=0)
+    nearest: Array = (np.arange(count)[:, None] == away.argmin(axis=0)).astype(np.float64)
+    return nearest
 
 
 def independence_move(mixture: StudentMixture) -> MHMove:

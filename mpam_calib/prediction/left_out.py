@@ -23,7 +23,7 @@ from mpam_calib.posterior.mode import climb_modes, evaluate
 from mpam_calib.posterior.points import KINDS
 from mpam_calib.posterior.row_motion import row_readings
 from mpam_calib.posterior.target import predict_force, without_level
-from mpam_calib.posterior.warmup import laplace_mixture
+from mpam_calib.posterior.weighing import laplace_mixture
 from mpam_calib.prediction.reading_noise import ReadingNoise
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import KPA

@@ -12,7 +12,7 @@ from mpam_calib.posterior.mode import evaluate
 from mpam_calib.posterior.proposal import StudentMixture
 from mpam_calib.posterior.sampling import sample
 from mpam_calib.posterior.target import build_target, locate
-from mpam_calib.posterior.warmup import CHECKED, LIGHT, heaviness
+from mpam_calib.posterior.weighing import CHECKED, LIGHT, heaviness
 
 from . import sbc
 

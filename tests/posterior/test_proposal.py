@@ -8,8 +8,7 @@ from emcee import EnsembleSampler, State
 from emcee.moves import MHMove
 from scipy import integrate, stats
 
-from mpam_calib.posterior.local import follow
-from mpam_calib.posterior.proposal import FREEDOM, StudentMixture, fit_local, fit_normals, independence_move
+from mpam_calib.posterior.proposal import FREEDOM, StudentMixture, fit_normals, independence_move
 
 MEANS = [np.array([0.0, 1.0]), np.array([3.0, -1.0])]
 SPREADS = [np.array([[1.0, 0.6], [0.6, 2.0]]), np.array([[0.3, -0.1], [-0.1, 0.5]])]
@@ -94,26 +93,12 @@ def effective_share(made: StudentMixture) -> float:
     return float(weight.sum() ** 2 / np.sum(weight**2) / len(weight))
 
 
-def test_a_local_mixture_follows_a_bend_that_few_normals_do_not():
+def test_many_normals_follow_a_bend_that_few_do_not():
     x = bent(6000)
     weight = np.full(len(x), 1.0 / len(x))
-    assert effective_share(fit_local(x, weight, np.random.RandomState(0))) > 0.5
-    assert effective_share(StudentMixture.build(*fit_normals(x, weight, 6))) < 0.4
-
-
-def test_weighted_draws_find_the_tail_that_no_walker_met():
-    """Walkers that never went beyond one sd on one side of the bend; 16 % of the density are there."""
-    x = bent(8000)
-    x = x[x[:, 0] < 1.0]
-    found = follow(log_bent, x, np.full(len(x), 1.0 / len(x)), 6, 3000, np.random.RandomState(0))
-    drawn = found.mixture.draw(20_000, np.random.RandomState(2))
-    assert np.mean(drawn[:, 0] > 1.0) > 0.1
-    assert found.share == pytest.approx(effective_share(found.mixture), abs=0.05)
-    assert found.share > 0.4
-    # The density is normalised, and its moments are known.
-    assert abs(found.log_integral) < 4.0 * found.error < 0.1
-    mean = found.weight @ found.drawn
-    np.testing.assert_allclose(mean, [0.0, 1.0], atol=0.1)
+    shares = [effective_share(StudentMixture.build(*fit_normals(x, weight, count))) for count in (1, 6, 20)]
+    assert shares[0] < 0.2
+    assert shares[2] > max(0.6, shares[1])
 
 
 def test_widened_draws_are_wider():

@@ -20,7 +20,7 @@ from mpam_calib.posterior.mode import evaluate
 from mpam_calib.posterior.proposal import StudentMixture
 from mpam_calib.posterior.sampling import sample
 from mpam_calib.posterior.target import build_target, locate, predict_force
-from mpam_calib.posterior.warmup import laplace_mixture
+from mpam_calib.posterior.weighing import laplace_mixture
 from mpam_calib.specimen.declaration import Braid, Geometry, Sensors
 from mpam_calib.specimen.recording import Loops, Specimen
 
