@@ -55,7 +55,7 @@ class StudentMixture:
         """Log density (n,) at points (n, d)."""
         d = x.shape[1]
         delta = x[:, None, :] - self.means
-        whitened = np.linalg.solve(self.roots, np.moveaxis(delta, 0, -1))
+        whitened = np.linalg.inv(self.roots) @ np.moveaxis(delta, 0, -1)
         square = np.sum(whitened**2, axis=1).T
         log_det = np.sum(np.log(np.diagonal(self.roots, axis1=1, axis2=2)), axis=1)
         v = np.broadcast_to(self.freedom, self.shares.shape)
@@ -86,7 +86,7 @@ def fit_normals(x: Array, weight: Array, count: int) -> tuple[list[Array], list[
         covariances = (spread + PULL * within) / (shares + PULL)[:, None, None]
         shares = (shares + PULL) / (1.0 + count * PULL)
         within = np.einsum("k,kij->ij", shares, covariances)
-        z = np.linalg.solve(np.linalg.cholesky(covariances), np.swapaxes(delta, 1, 2))
+        z = np.linalg.inv(np.linalg.cholesky(covariances)) @ np.swapaxes(delta, 1, 2)
         log_det = 0.5 * np.linalg.slogdet(covariances)[1]
         log = np.log(shares)[:, None] - log_det[:, None] - 0.5 * np.sum(z**2, axis=1)
         own = weight * special.softmax(log, axis=0)

@@ -19,7 +19,8 @@ from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.ensembles import Block, EnsembleState, Moves
 from mpam_calib.posterior.mode import Mode, climb, curvature
 from mpam_calib.posterior.proposal import StudentMixture
-from mpam_calib.posterior.weighing import Evaluate, refit, weigh
+from mpam_calib.posterior.rounds import Evaluate
+from mpam_calib.posterior.weighing import refit, weigh
 
 Array = NDArray[np.float64]
 
