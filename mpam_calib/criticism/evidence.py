@@ -5,8 +5,10 @@ Each works on a model's fits, one for each size of the remainder, and sums over 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import log
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -15,6 +17,8 @@ from numpy.typing import NDArray
 from mpam_calib.criticism.fit import Fit
 from mpam_calib.criticism.hypothesis import Hypothesis
 from mpam_calib.criticism.problem import SIZE_PRIOR, Problem
+from mpam_calib.criticism.rates import Rates
+from mpam_calib.criticism.rates_alone import integrate_rates
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.posterior.annealed import anneal
 from mpam_calib.posterior.bridge import Bridge, bridge_evidence
@@ -26,7 +30,8 @@ Array = NDArray[np.float64]
 NEGLIGIBLE, NEGLIGIBLE_ELSEWHERE = 5.0, 8.0
 """Nats below the best size at which Laplace's figure will do; and at which other priors are not tried."""
 SETTLES = 7
-"""Parameters up to which the rule of quadrature settles; with more a crowd of points is annealed."""
+"""Parameters up to which the rule of quadrature settles; with more a crowd of points is annealed, and rates
+of each modulus's own are integrated alone."""
 OWN_RATES = "exponential_each"
 AS_DECLARED = (1.0, 1.0)
 WIDTHS = {
@@ -48,15 +53,20 @@ class Weighed:
 
 
 def log_evidence_beyond_laplace(
-    problem: Problem, blueprint: Blueprint, fits: list[Fit], worth: float = -np.inf
+    problem: Problem,
+    blueprint: Blueprint,
+    fits: list[Fit],
+    worth: float = -np.inf,
+    rates: Mapping[int, Rates] = MappingProxyType({}),
 ) -> tuple[float, float]:
     """Log evidence, summed over the remainder's sizes, and its standard error.
 
     With many parameters, or rates of each modulus's own, that takes long: where the evidence at the density's
-    own mode is not ``worth`` it (nats), Laplace's figure there will do.
+    own mode is not ``worth`` it (nats), Laplace's figure there will do. ``rates`` is what moduli free at each
+    level say of the law's rates, by size of the remainder.
     """
     slow = many_parameters(fits) or blueprint.simulation.law == OWN_RATES
-    terms, inner = _sizes(problem, blueprint, fits, worth=worth if slow else -np.inf)
+    terms, inner = _sizes(problem, blueprint, fits, worth=worth if slow else -np.inf, rates=rates)
     value = float(np.logaddexp.reduce(list(terms.values())))
     return value, _error(terms, {size: found.error for size, (_, found) in inner.items()})
 
@@ -109,6 +119,7 @@ def _sizes(
     fits: list[Fit],
     widths: tuple[float, float] = AS_DECLARED,
     worth: float = -np.inf,
+    rates: Mapping[int, Rates] = MappingProxyType({}),
 ) -> tuple[dict[int, float], dict[int, tuple[Hypothesis, Evidence]]]:
     """Terms of the sum by size, and the densities behind those that were integrated.
 
@@ -138,12 +149,18 @@ def _sizes(
     for size in sorted(modes, key=lambda s: -terms[s]):
         if terms[size] < best - NEGLIGIBLE:
             break
-        integral = (anneal if many else integrate)(*modes[size])
+        integral = _integral(*modes[size], rates.get(size)) if many else integrate(*modes[size])
         if many or integral.reliable:
             terms[size] = integral.value + log(SIZE_PRIOR[size])
             inner[size] = modes[size][0], integral
         best = max(best, terms[size])
     return terms, inner
+
+
+def _integral(hypothesis: Hypothesis, mode: Mode, rates: Rates | None) -> Evidence:
+    """The evidence of a model with many parameters: most of them rates, or annealed."""
+    alone = integrate_rates(rates, hypothesis, mode) if rates is not None else None
+    return alone or anneal(hypothesis, mode)
 
 
 def prior_sensitivity(evidence: Array) -> pd.DataFrame:

@@ -26,10 +26,11 @@ from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.moduli import rate_names
 from mpam_calib.specimen.declaration import Simulation
 
-NEAR, LEADING, CLOSE = 50.0, 20.0, 8.0
+NEAR, LEADING, CLOSE, CHEAP = 50.0, 20.0, 8.0, 15.0
 """Nats below the best within which quadrature replaces Laplace's evidence; within which it does so for
-SETTLES parameters, and the density's own mode and curvature for more; and within which models that take long
-(more parameters, or rates of each modulus's own) are integrated or annealed."""
+SETTLES parameters, and the density's own mode and curvature for more; within which models that take long
+(more parameters, or rates of each modulus's own) are integrated or annealed; and within which they are
+where that is cheap, since most of many parameters are rates."""
 PROMISING = 60.0
 """Nats below the best model so far within which a law's rates are searched for all their modes."""
 AGAIN = 4
@@ -108,11 +109,17 @@ def rank_spread(
         for i, r in enumerate(ranked)
         if r.log_evidence >= top - (NEAR if len(r.best.u) < SETTLES else LEADING) or always(r.simulation)
     ]
-    asked = [(ranked[i], top - CLOSE) for i in wanted]
+    free = _free(ranked)
+    asked = [(ranked[i], free(ranked[i]), top - (CHEAP if _cheap(ranked[i]) else CLOSE)) for i in wanted]
     for number, (i, better) in enumerate(zip(wanted, spread(integrated, asked), strict=True)):
         ranked[i] = better
         tell("integrating", (number + 1) / len(wanted))
     return sorted(ranked, key=lambda r: -r.log_evidence)
+
+
+def _cheap(ranked: Ranked) -> bool:
+    """Whether the evidence is that of rates alone."""
+    return ranked.simulation.law == EACH and len(ranked.best.u) > SETTLES
 
 
 def _searched_again(spread: Spread, ranked: list[Ranked]) -> list[Ranked]:
@@ -122,14 +129,18 @@ def _searched_again(spread: Spread, ranked: list[Ranked]) -> list[Ranked]:
     """
     close = max(r.log_evidence for r in ranked) - NEAR
     wanted = [i for i, r in enumerate(ranked) if r.simulation.law == EACH and r.log_evidence >= close]
-    free = {s.simulation.model_dump_json(): s for s in ranked if s.simulation.law == FREE}
-    like = [ranked[i].simulation.model_copy(update={"law": FREE}).model_dump_json() for i in wanted]
-    seeds = range(1, 1 + AGAIN)
-    tasks = [(ranked[i], free.get(key), seed) for i, key in zip(wanted, like, strict=True) for seed in seeds]
+    free, seeds = _free(ranked), range(1, 1 + AGAIN)
+    tasks = [(ranked[i], free(ranked[i]), seed) for i in wanted for seed in seeds]
     found = list(spread(_search_again, tasks))
     for number, i in enumerate(wanted):
         ranked[i] = max([ranked[i], *found[number * AGAIN : (number + 1) * AGAIN]], key=_evidence)
     return ranked
+
+
+def _free(ranked: list[Ranked]) -> Callable[[Ranked], Ranked | None]:
+    """Finds the model that is the same but for moduli free at each level."""
+    free = {r.simulation.model_dump_json(): r for r in ranked if r.simulation.law == FREE}
+    return lambda r: free.get(r.simulation.model_copy(update={"law": FREE}).model_dump_json())
 
 
 def blueprint_of(problem: Problem, simulation: Simulation) -> Blueprint:
@@ -167,12 +178,16 @@ def _ranked(problem: Problem, simulation: Simulation, fits: list[Fit]) -> Ranked
     return Ranked(simulation, fits, float(np.logaddexp.reduce(terms)), ceiling=max(reached))
 
 
-def integrated(task: tuple[Ranked, float]) -> Ranked:
-    """The model with its evidence by quadrature or annealing; what takes long, if ``worth`` it (nats)."""
-    ranked, worth = task
+def integrated(task: tuple[Ranked, Ranked | None, float]) -> Ranked:
+    """The model with its evidence by quadrature or annealing; what takes long, if ``worth`` it (nats).
+
+    ``free`` is the same model with moduli free at each level.
+    """
+    ranked, free, worth = task
     problem = held_problem()
     blueprint = blueprint_of(problem, ranked.simulation)
-    value, error = log_evidence_beyond_laplace(problem, blueprint, ranked.fits, worth)
+    rates = _rates_by_size(problem, ranked.simulation, free)
+    value, error = log_evidence_beyond_laplace(problem, blueprint, ranked.fits, worth, rates)
     return replace(ranked, log_evidence=value, error=error)
 
 

@@ -76,7 +76,7 @@ class Rates:
         return rate_names(simulation.law, simulation.order)
 
     @cached_property
-    def _seen(self) -> tuple[Array, Array]:
+    def seen(self) -> tuple[Array, Array]:
         """Whitened columns (s, d + L·order) of sizes and free moduli, and the data (s,); without priors."""
         mode = np.concatenate([self.fit.u, self.fit.eta])
         precision = np.linalg.inv(self.fit.covariance)
@@ -91,7 +91,7 @@ class Rates:
     @cached_property
     def offset(self) -> float:
         """What log densities here (and half log determinants) lack of the fit's log evidence, nats."""
-        seen, data = self._seen
+        seen, data = self.seen
         coefficients = _block(self.free).coefficients(self.fit.eta[None], {})[0]
         residual = data - seen @ np.concatenate([self.fit.u, coefficients])
         height = -0.5 * float(residual @ residual + self.fit.u @ self.fit.u + self.fit.eta @ self.fit.eta)
@@ -99,13 +99,10 @@ class Rates:
 
     def look(self, rates: Array) -> Place:
         """All else at its optimum for rates (B, r), and how that changes with them."""
-        block, (seen, data), d = _block(self.law), self._seen, len(self.fit.u)
+        block, (seen, data), d = _block(self.law), self.seen, len(self.fit.u)
         B, levels, order = len(rates), block.law.levels, block.law.order
         values, pace = self._values(rates)
-        h = block.law.basis(levels, np.full(len(levels), -1), values)
-        by = block.transform(values)[1].reshape(B, 2, order, -1)
-        moduli = np.einsum("blak,bakp->blkp", np.broadcast_to(h, (B, len(levels), 2, order)), by)
-        moduli = moduli.reshape(B, len(levels) * order, -1)
+        h, by, moduli = self._tied(B, values)
         X = np.concatenate([np.broadcast_to(seen[:, :d], (B, len(seen), d)), seen[:, d:] @ moduli], axis=2)
         across = np.swapaxes(X, 1, 2)
         best = np.linalg.solve(across @ X + np.eye(X.shape[2]), (across @ data)[..., None])[..., 0]
@@ -119,6 +116,19 @@ class Rates:
             slopes = slopes.sum(axis=2, keepdims=True)
         quadratic = sum(np.sum(part**2, axis=1) for part in (residual, best, rates))
         return Place(rates, X, best, residual, slopes.reshape(B, len(seen), -1), -0.5 * quadratic)
+
+    def moduli(self, rates: Array) -> Array:
+        """The moduli at the levels for unit coordinates of the law, (B, L·order, p)."""
+        return self._tied(len(rates), self._values(rates)[0])[2]
+
+    def _tied(self, B: int, values: dict[str, Array]) -> tuple[Array, Array, Array]:
+        """The law's functions h (B or 1, L, 2, order or 1), its transform by modulus, and both together."""
+        law = _block(self.law).law
+        h = law.basis(law.levels, np.full(len(law.levels), -1), values)
+        by = _block(self.law).transform(values)[1].reshape(B, 2, law.order, -1)
+        every = np.broadcast_to(h, (B, len(law.levels), 2, law.order))
+        moduli = np.einsum("blak,bakp->blkp", every, by)
+        return h, by, moduli.reshape(B, len(law.levels) * law.order, -1)
 
     def _values(self, rates: Array) -> tuple[dict[str, Array], Array]:
         """Values (B, 1) by name, and their change (B, order or 1, 2) with the coordinates."""

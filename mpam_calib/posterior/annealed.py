@@ -40,7 +40,16 @@ STEPS, SHORTEST = 30, 1e-12
 
 def anneal(density: Density, mode: Mode, seed: int = 0) -> Evidence:
     """Evidence of the density about a mode; mean and covariance are those of the points at the end."""
-    rng = np.random.RandomState(np.random.SeedSequence([seed, 12]).generate_state(1)[0])
+    log_z, u = lead(
+        density, mode, np.random.RandomState(np.random.SeedSequence([seed, 12]).generate_state(1)[0])
+    )
+    value, error = scatter(log_z[:, None])
+    error = max(error, 0.5 * abs(value - mode.log_evidence))
+    return Evidence(value, error, u.mean(axis=0), np.cov(u.T))
+
+
+def lead(density: Density, mode: Mode, rng: np.random.RandomState) -> tuple[Array, Array]:
+    """Each crowd's log evidence (CROWDS,), and where all points (CROWDS·POINTS, d) end."""
     points = _Points.drawn(density, mode, rng)
     reached, log_z = 0.0, np.zeros(CROWDS)
     for number in range(STEPS):
@@ -53,9 +62,7 @@ def anneal(density: Density, mode: Mode, seed: int = 0) -> Evidence:
         reached = further
         for length in MOVES:
             points.move(reached, length, rng)
-    value, error = scatter(log_z[:, None])
-    error = max(error, 0.5 * abs(value - mode.log_evidence))
-    return Evidence(value, error, points.u.mean(axis=0), np.cov(points.u.T))
+    return log_z, points.u
 
 
 @dataclass

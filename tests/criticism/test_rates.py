@@ -55,14 +55,14 @@ def exact(problem: Problem, law: str, rates: np.ndarray) -> float:
 def test_density_is_the_fit_s_own_where_levels_are_held(problem: Problem, law: str) -> None:
     """With nothing but moduli the Gaussian is exact: all rates are equally far from a climb's density."""
     target = rates_of(problem, law)
-    held = replace(problem, readings=replace(problem.readings, pressure=_held(problem)))
+    held = replace(problem, readings=replace(problem.readings, pressure=held_pressures(problem)))
     target = replace(target, fit=fit(held, frozenset(), SIZE, None, plain(problem, "free")))
     rates = target.draws(8, seed=1)[-8:]
     off = target.look(rates).objective - np.array([exact(held, law, u) for u in rates])
     np.testing.assert_allclose(off, off[0], atol=1e-4 * np.ptp([exact(held, law, u) for u in rates]) + 1e-3)
 
 
-def _held(problem: Problem) -> np.ndarray:
+def held_pressures(problem: Problem) -> np.ndarray:
     """Every reading's pressure at its level, as the free moduli have it."""
     assert problem.model.setting is not None
     return problem.model.setting.levels[np.concatenate([problem.level, problem.level])]
