@@ -6,7 +6,7 @@ All on the axes that whiten the problem's noise and remainder; both priors enter
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy.linalg import lapack
 
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.bend import is_bend
-from mpam_calib.model.chain import Chain
+from mpam_calib.model.chain import Chain, Unsigned
 
 Array = NDArray[np.float64]
 
@@ -76,6 +76,7 @@ class Climb:
     chain: Chain
     size: int
     extra: Array
+    _kept: tuple[Array, Unsigned] | None = field(default=None, init=False, repr=False)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -109,7 +110,7 @@ class Climb:
         if self.chain.uses_force:
             points = np.concatenate([points, points[:1]])
             guides = _nudged(guide, len(points), nudge)
-        fixed, slope, columns, beside = self.chain.factored(self.values(points), readings, guides)
+        fixed, slope, columns, beside = self._unsigned(points, guides).pulling(guides)
         factor = np.ones(1)
         if self.chain.uses_force:
             # A force that depends on itself, F = f(F): one Newton step of its fixed point, for all at once.
@@ -144,6 +145,12 @@ class Climb:
             pulls=np.sign(force[0] - beside[0]),
             objective=objective if np.isfinite(objective) else -np.inf,
         )
+
+    def _unsigned(self, points: Array, guide: Array) -> Unsigned:
+        """The force at points (B, d): kept, as most places are looked at once more with other signs."""
+        if self.chain.uses_force or self._kept is None or not np.array_equal(points, self._kept[0]):
+            self._kept = points, self.chain.unsigned(self.values(points), self.problem.lean[0], guide)
+        return self._kept[1]
 
     def slopes(self, place: Place) -> Array:
         """Whitened changes of the force with all coordinates, (n, d + q)."""

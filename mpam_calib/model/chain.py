@@ -56,6 +56,26 @@ class Factors(NamedTuple):
     beside: Array
 
 
+class Unsigned(NamedTuple):
+    """A force but for which way the muscle pulls: F = slope·(fixed + columns·η) + beside.
+
+    Shapes as in :class:`Factors`; the slope comes from the ``state`` and the pull.
+    """
+
+    fixed: Array
+    columns: Array
+    beside: Array
+    state: State
+
+    def pulling(self, guide: Array | None) -> Factors:
+        """With the signs that a force estimate (B or 1, n), N, says; without one the muscle pulls."""
+        # Coulomb's law goes by what the muscle itself pulls, not by what the load cell reads.
+        pull = np.ones(1) if guide is None else np.sign(guide - self.beside)
+        state = self.state
+        slope = state.gain * coulomb_factor(state.friction_gain * state.coulomb, state.sign, pull)
+        return Factors(slope * self.fixed + self.beside, slope, self.columns, self.beside)
+
+
 @dataclass(frozen=True)
 class Chain:
     """A declared simulation with its effects, ready to be evaluated for many parameter vectors."""
@@ -120,14 +140,14 @@ class Chain:
         The slope (B or 1, n) is what friction and gain make of the muscle's own force; the columns are
         (1, n, p) where no parameter changes them.
         """
+        return self.unsigned(values, readings, guide).pulling(guide)
+
+    def unsigned(self, values: Values, readings: Readings, guide: Array | None = None) -> Unsigned:
+        """:meth:`factored` but for the pull's signs: alike for all guides without :attr:`uses_force`."""
         state, shape = self._to_shape(values, readings, np.zeros(len(readings)) if guide is None else guide)
         fixed, columns = self._statics(state, shape, values)
         state = self._to_sensor(state, values)
-        beside = self._friction_beside(state) + state.zero
-        # Coulomb's law goes by what the muscle itself pulls, not by what the load cell reads.
-        pull = np.ones(1) if guide is None else np.sign(guide - beside)
-        slope = state.gain * coulomb_factor(state.friction_gain * state.coulomb, state.sign, pull)
-        return Factors(slope * fixed + beside, slope, columns, beside)
+        return Unsigned(fixed, columns, self._friction_beside(state) + state.zero, state)
 
     def force(self, values: Values, eta: Array, readings: Readings) -> Array:
         """Force (B, n), N, for coordinates η (B, p): exact; by secants where it depends on itself."""

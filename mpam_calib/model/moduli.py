@@ -92,14 +92,18 @@ class Law:
         if self.name == "linear":
             return np.stack([P, np.ones_like(P)], axis=-1)[..., None]
         if self.name == "free":
-            hats = np.stack([np.interp(pressure, self.levels, row) for row in np.eye(len(self.levels))], -1)
             known = level >= 0
-            hats[known] = np.eye(len(self.levels))[level[known]]
+            hats = np.eye(len(self.levels))[level]
+            if not known.all():
+                between = pressure[~known]
+                hats[~known] = np.stack(
+                    [np.interp(between, self.levels, row) for row in np.eye(len(self.levels))], -1
+                )
             return hats[None, :, :, None]
         names = ["d"] if self.name == "exponential" else [f"d_{k}" for k in range(1, self.order + 1)]
-        d = np.concatenate([values[name] for name in names], axis=1)[:, None, :]
-        gap = np.concatenate([values[name.replace("d", "gap")] for name in names], axis=1)[:, None, :]
-        return np.stack([_exp(d * P[..., None]), _exp((d - gap) * P[..., None])], axis=2)
+        d = np.concatenate([values[name] for name in names], axis=1)
+        gap = np.concatenate([values[name.replace("d", "gap")] for name in names], axis=1)
+        return _exp(np.stack([d, d - gap], axis=1)[:, None] * P[..., None, None])
 
 
 ALIKE = 1e-10
