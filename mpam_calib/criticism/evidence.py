@@ -1,11 +1,11 @@
-"""Evidence of the leading models beyond Laplace: quadrature or annealing, bridges, other prior widths.
+"""Evidence of the leading models beyond Laplace: its next term, quadrature, annealing, bridges, other priors.
 
 Each works on a model's fits, one for each size of the remainder, and sums over the sizes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import log
 from types import MappingProxyType
@@ -23,7 +23,8 @@ from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.posterior.annealed import anneal
 from mpam_calib.posterior.bridge import Bridge, bridge_evidence
 from mpam_calib.posterior.evidence import Evidence, integrate
-from mpam_calib.posterior.mode import Mode
+from mpam_calib.posterior.expansion import expand
+from mpam_calib.posterior.mode import Density, Mode
 
 Array = NDArray[np.float64]
 
@@ -61,12 +62,14 @@ def log_evidence_beyond_laplace(
 ) -> tuple[float, float]:
     """Log evidence, summed over the remainder's sizes, and its standard error.
 
-    With many parameters, or rates of each modulus's own, that takes long: where the evidence at the density's
-    own mode is not ``worth`` it (nats), Laplace's figure there will do. ``rates`` is what moduli free at each
-    level say of the law's rates, by size of the remainder.
+    By Laplace's expansion to its next term where that is small, by quadrature elsewhere. With many
+    parameters, or rates of each modulus's own, that takes long: where the evidence at the density's own mode
+    is not ``worth`` it (nats), Laplace's figure there will do. ``rates`` is what moduli free at each level
+    say of the law's rates, by size of the remainder.
     """
     slow = many_parameters(fits) or blueprint.simulation.law == OWN_RATES
-    terms, inner = _sizes(problem, blueprint, fits, worth=worth if slow else -np.inf, rates=rates)
+    worth = worth if slow else -np.inf
+    terms, inner = _sizes(problem, blueprint, fits, worth=worth, rates=rates, rule=_expanded)
     value = float(np.logaddexp.reduce(list(terms.values())))
     return value, _error(terms, {size: found.error for size, (_, found) in inner.items()})
 
@@ -120,10 +123,12 @@ def _sizes(
     widths: tuple[float, float] = AS_DECLARED,
     worth: float = -np.inf,
     rates: Mapping[int, Rates] = MappingProxyType({}),
+    rule: Callable[[Density, Mode], Evidence] = integrate,
 ) -> tuple[dict[int, float], dict[int, tuple[Hypothesis, Evidence]]]:
     """Terms of the sum by size, and the densities behind those that were integrated.
 
     ``widths`` as in WIDTHS; where Laplace's figures are not ``worth`` more (nats), they will do.
+    ``rule`` integrates up to SETTLES parameters.
     """
     terms = {f.size: f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits}
     best, laplace = max(terms.values()), np.logaddexp.reduce(list(terms.values()))
@@ -149,12 +154,20 @@ def _sizes(
     for size in sorted(modes, key=lambda s: -terms[s]):
         if terms[size] < best - NEGLIGIBLE:
             break
-        integral = _integral(*modes[size], rates.get(size)) if many else integrate(*modes[size])
+        integral = _integral(*modes[size], rates.get(size)) if many else rule(*modes[size])
         if many or integral.reliable:
             terms[size] = integral.value + log(SIZE_PRIOR[size])
             inner[size] = modes[size][0], integral
         best = max(best, terms[size])
     return terms, inner
+
+
+def _expanded(density: Density, mode: Mode) -> Evidence:
+    """The evidence of a few parameters: quadrature only where a bound is near or the density is bent."""
+    expansion = expand(density, mode)
+    if expansion.tame:
+        return Evidence(expansion.value, expansion.error, mode.u, mode.covariance)
+    return integrate(density, mode)
 
 
 def _integral(hypothesis: Hypothesis, mode: Mode, rates: Rates | None) -> Evidence:

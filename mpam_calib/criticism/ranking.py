@@ -1,4 +1,4 @@
-"""A space of models ranked by evidence: Laplace's for all of them, quadrature for those near the top.
+"""A space of models ranked by evidence: Laplace's for all, its next term or quadrature near the top.
 
 The evidence of a model is summed over the remainder's sizes. Of models that differ in their law alone those
 without rates are fitted first: the moduli free at each level tell where the others' rates may be
@@ -27,7 +27,7 @@ from mpam_calib.model.moduli import rate_names
 from mpam_calib.specimen.declaration import Simulation
 
 NEAR, LEADING, CLOSE, CHEAP = 50.0, 20.0, 8.0, 15.0
-"""Nats below the best within which quadrature replaces Laplace's evidence; within which it does so for
+"""Nats below the best within which Laplace's next term or quadrature follows; within which they do for
 SETTLES parameters, and the density's own mode and curvature for more; within which models that take long
 (more parameters, or rates of each modulus's own) are integrated or annealed; and within which they are
 where that is cheap, since most of many parameters are rates."""
@@ -70,9 +70,9 @@ class Ranked:
 def rank(problem: Problem, space: Sequence[Simulation], *, workers: int = 2) -> list[Ranked]:
     """The models of a space, most evidence first; those that cannot be fitted are left out.
 
-    Those within NEAR nats of the best have their evidence by quadrature, the others by Laplace's
-    approximation. The noise is settled first (:mod:`mpam_calib.criticism.noise_scale`). One worker means
-    this process.
+    Those within NEAR nats of the best have their evidence by Laplace's expansion to its next term or, where
+    that is large, by quadrature; the others by Laplace's approximation. The noise is settled first
+    (:mod:`mpam_calib.criticism.noise_scale`). One worker means this process.
     """
     with spread_over(settle_noise(problem, space), workers) as spread:
         return rank_spread(spread, space)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,13 +25,20 @@ from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.moduli import rate_names
 from mpam_calib.posterior.evidence import integrate
+from mpam_calib.posterior.expansion import expand
 from mpam_calib.posterior.mode import Mode
+from mpam_calib.specimen import read
+
+DATASETS = Path(__file__).parents[2] / "datasets"
 
 
 @pytest.fixture(scope="module")
 def problem() -> Problem:
-    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
-    return problem_of(specimen_of(recipe.name))
+    return problem_of(specimen_of(loops_of_a_rig()))
+
+
+def loops_of_a_rig() -> str:
+    return next(r.name for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
 
 
 def declared(problem: Problem, **changed: object) -> Blueprint:
@@ -177,23 +185,31 @@ def test_shares_under_other_priors() -> None:
     )
 
 
-def test_laplace_near_the_top_is_the_quadrature(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
-    """At the density's own mode: within 0.02 nat without rates and with every size 4 sd or more above 0."""
-    monkeypatch.setattr(space, "ORDERS", range(2, 5))
-    case = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
-    models = [s for s in space.model_space(specimen_of(case.name)) if not rate_names(s.law, s.order)]
+@pytest.mark.parametrize("name", ["a rig's loops", "mpam1_reconstructed", "mpam2_reconstructed"])
+def test_laplace_near_the_top_is_the_quadrature(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To its next term, at the density's own mode: within 0.02 nat with every size 4 sd or more above 0.
+
+    Of models without rates; to its first term it misses by up to 0.032 nat where sizes are many.
+    """
+    monkeypatch.setattr(space, "ORDERS", range(2, 6))
+    specimen = read(DATASETS / name) if (DATASETS / name).exists() else specimen_of(loops_of_a_rig())
+    problem = problem_of(specimen)
+    models = [s for s in space.model_space(specimen) if not rate_names(s.law, s.order)]
     ranked = [r for s in models if (r := ranking.fitted(problem, s)) is not None]
     near = max(r.log_evidence for r in ranked) - ranking.NEAR
-    compared = 0
+    off = []
     for r in ranked:
         if r.log_evidence < near or not len(r.best.u):
             continue
         hypothesis = Hypothesis(problem, ranking.blueprint_of(problem, r.simulation), r.best)
         mode = hypothesis.mode()
         if _inside(hypothesis, mode) >= 4.0:
-            compared += 1
-            assert mode.log_evidence == pytest.approx(integrate(hypothesis, mode).value, abs=0.02)
-    assert compared >= 5
+            exact = integrate(hypothesis, mode).value
+            off.append((mode.log_evidence - exact, expand(hypothesis, mode).value - exact))
+    assert len(off) >= 5
+    first, second = np.abs(off).T
+    assert second.max() < 0.02
+    assert np.sqrt(np.mean(second**2)) < np.sqrt(np.mean(first**2))
 
 
 def _inside(hypothesis: Hypothesis, mode: Mode) -> float:
