@@ -133,7 +133,6 @@ def _sizes(
     terms = {f.size: f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits}
     best, laplace = max(terms.values()), np.logaddexp.reduce(list(terms.values()))
     declared, many = widths == AS_DECLARED, many_parameters(fits)
-    anew = many or not declared or blueprint.simulation.law == OWN_RATES
     # Under other priors the fits' own evidences say only roughly which sizes matter.
     within = NEGLIGIBLE if declared else NEGLIGIBLE_ELSEWHERE
     modes: dict[int, tuple[Hypothesis, Mode]] = {}
@@ -141,10 +140,9 @@ def _sizes(
         if terms[found.size] < best - within:
             continue
         hypothesis = Hypothesis(problem, blueprint, found, *widths)
-        mode = hypothesis.mode() if anew else hypothesis.fitted_mode()
+        mode = hypothesis.mode()
         modes[found.size] = hypothesis, mode
-        if anew:
-            terms[found.size] = mode.log_evidence + log(SIZE_PRIOR[found.size])
+        terms[found.size] = mode.log_evidence + log(SIZE_PRIOR[found.size])
     terms = {size: value for size, value in terms.items() if declared or size in modes}
     inner: dict[int, tuple[Hypothesis, Evidence]] = {}
     if max(laplace, np.logaddexp.reduce(list(terms.values()))) < worth:

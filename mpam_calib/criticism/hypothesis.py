@@ -123,12 +123,6 @@ class Hypothesis:
         pull = np.einsum("bk,bkp->bp", share, (residual @ self._memo["white"]).reshape(-1, r, p))
         return (each @ gram).reshape(-1, p, p), pull
 
-    def fitted_mode(self) -> Mode:
-        """Where the fit ended, with its own curvature: about the mode under the priors it was fitted with."""
-        d = len(self.fit.u)
-        top = float(self.log_posterior(self.fit.u[None])[0])
-        return Mode(self.fit.u, top, self.fit.covariance[:d, :d])
-
     def mode(self) -> Mode:
         """The mode that Newton steps from the fit lead to, or a climb where they do not settle."""
         d = len(self.parameters)
