@@ -78,7 +78,8 @@ def expand(density: Density, mode: Mode) -> Expansion:
     ijk = three.prod(axis=1) @ last / (8.0 * h**3)
     along = iii + np.bincount(j, iij, d) + np.bincount(i, ijj, d)
     every = np.sum(iii**2) + 3.0 * (np.sum(iij**2) + np.sum(ijj**2)) + 6.0 * np.sum(ijk**2)
-    # The mode is not quite the top, and its covariance comes from wider differences: Laplace's figure anew.
+    # The mode is not quite the top (its slope adds ½ Σ f_k f_iik), and its covariance comes from wider
+    # differences: Laplace's figure anew.
     slope = (8.0 * (up - down) - (far[0] - far[1])) / (12.0 * h)
     bend = np.diag((16.0 * near.sum(axis=0) - far.sum(axis=0) - 30.0 * top) / (12.0 * h**2))
     bend[i, j] = bend[j, i] = (corners[0] - corners[1] - corners[2] + corners[3]) / (4.0 * h**2)
@@ -88,5 +89,5 @@ def expand(density: Density, mode: Mode) -> Expansion:
     laplace = top + 0.5 * (d * np.log(2.0 * np.pi) + np.linalg.slogdet(mode.covariance)[1])
     laplace += 0.5 * np.sum((slope @ axes) ** 2 / precision - np.log(precision))
     fourth = np.sum(iiii) / 8.0 + np.sum(iijj) / 4.0
-    third = np.sum(along**2) / 8.0 + every / 12.0
+    third = 0.5 * slope @ along + np.sum(along**2) / 8.0 + every / 12.0
     return Expansion(float(laplace), float(fourth), float(third))
