@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mpam_calib.arviz_import import import_arviz
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import ROUGH
 from mpam_calib.posterior.batch import batch_size
@@ -116,7 +117,7 @@ def _likelihood(target: Collapsed, draws: Draws) -> Array:
 
 def _reweighted(fold: Collapsed, draws: Draws, whole: Array, rng: np.random.Generator) -> Array | None:
     """Coordinates (N, d) drawn from the posterior without the level; None where none can be found."""
-    import arviz as az
+    az = import_arviz()
 
     ratio = _likelihood(fold, draws) - whole
     weight, shape = az.psislw(np.where(np.isfinite(ratio), ratio, -np.inf))

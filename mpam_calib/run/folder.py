@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mpam_calib.arviz_import import import_arviz
 from mpam_calib.calibration import Calibration
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Blueprint, MaterialPosterior
@@ -128,7 +129,7 @@ def describe(calibration: Calibration, digest: str) -> dict[str, Any]:
 
 def write_posterior(calibration: Calibration, path: Path) -> None:
     """ArviZ InferenceData, chain = ensemble: reported quantities in lab units, and what predictions need."""
-    import arviz as az
+    az = import_arviz()
 
     draws, chains = calibration.draws, calibration.draws.chains
     posterior = {item.name: item.draws.reshape(chains, -1) for item in calibration.reported}
@@ -169,7 +170,7 @@ class StoredRun:
 
 def load_run(path: Path) -> StoredRun:
     """Read a RUN folder; raises ``InputError`` where it is none or is not finished."""
-    import arviz as az
+    az = import_arviz()
 
     try:
         state: dict[str, Any] = json.loads((path / "run.json").read_text(encoding="utf-8"))

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mpam_calib.arviz_import import import_arviz
 from mpam_calib.errors import InputError
 from mpam_calib.thesis import decoded, friction
 from mpam_calib.thesis.tables import table
@@ -82,7 +83,7 @@ class MuscleBands:
 
 def _strand_draws(run: Path) -> Array | None:
     """Draws of f_s, (draws,), of a RUN folder; None where it holds no posterior."""
-    import arviz as az
+    az = import_arviz()
 
     if not (run / "posterior.nc").is_file():
         return None
