@@ -21,6 +21,8 @@ from mpam_calib.model.priors import Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
+Parameters = Callable[[Setting], tuple[Parameter, ...]]
+"""An effect's parameters for a setting."""
 Values = Mapping[str, Array]
 """Parameter values by name, SI units, shape (B, 1)."""
 
@@ -52,6 +54,11 @@ class Effect:
     forms that differ from it in kind and may bend too (``id:form-bent``), with a few words for each. Bends
     multiply a size; where it may come back to nothing and pass it, they are ``added`` in units of its prior
     sd. A bent effect without parameters reads its size under its own id.
+
+    Other authors' equations are forms, too: ``own`` are the parameters that a form has beside the effect's
+    (such forms do not bend), ``leading`` how many of the effect's it makes use of, where not of all,
+    ``recalls`` the forms that have a memory though the effect has none, and ``sources`` where the forms'
+    equations are from.
     """
 
     id: str
@@ -59,7 +66,7 @@ class Effect:
     title: str
     sentence: str
     source: str
-    parameters: Callable[[Setting], tuple[Parameter, ...]]
+    parameters: Parameters
     apply: Callable[[State, Values, Setting], State]
     forms: Mapping[str, Callable[[State, Values, Setting], State]] = field(default_factory=dict)
     told_by: str = ""
@@ -70,6 +77,10 @@ class Effect:
     looseness: float = 1.0
     added: bool = False
     kinds: Mapping[str, str] = field(default_factory=dict)
+    own: Mapping[str, Parameters] = field(default_factory=dict)
+    leading: Mapping[str, int] = field(default_factory=dict)
+    recalls: tuple[str, ...] = ()
+    sources: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def bent_forms(self) -> tuple[str, ...]:
@@ -103,8 +114,24 @@ def effect(identifier: str) -> Effect:
         return found
     plain = form.removesuffix(FORM).removesuffix("-")
     if plain:
-        found = replace(found, apply=found.forms[plain])
+        found = formed(found, plain)
     return replace(found if plain == form else bent(found), id=identifier)
+
+
+def formed(item: Effect, form: str) -> Effect:
+    """The effect in one of its ``forms``, with the parameters and the source that the form has of its own."""
+
+    def parameters(setting: Setting) -> tuple[Parameter, ...]:
+        shared = item.parameters(setting)[: item.leading.get(form)]
+        return (*shared, *(item.own[form](setting) if form in item.own else ()))
+
+    return replace(
+        item,
+        parameters=parameters,
+        apply=item.forms[form],
+        memory=item.memory or form in item.recalls,
+        source=item.sources.get(form, item.source),
+    )
 
 
 def bent(item: Effect) -> Effect:

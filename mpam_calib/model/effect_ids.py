@@ -29,13 +29,33 @@ EFFECT_IDS: Final[tuple[str, ...]] = (
 
 EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(EFFECT_IDS, ("bent",)),
-    "dead_band": ("bent", "soft"),
-    "rate_friction": ("bent", "viscous", "viscous-bent"),
-    "presliding": ("bent", "rest", "sliding", "ramp", "rest-bent", "sliding-bent", "ramp-bent"),
-    "stress_softening": ("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),
-    "pressure_droop": ("bent", "level", "level-bent"),
-    "creep": ("bent", "wall", "wall-bent"),
-    "force_drift": ("bent", "settling", "settling-bent", "tared", "tared-bent"),
+    "dead_band": ("bent", "soft", "power", "closing"),
+    "tip_shape": ("bent", "power", "round"),
+    "braid_kinematics": ("bent", "swell"),
+    "braid_angle": ("bent", "seating"),
+    "braid_stretch": ("bent", "power"),
+    "wall_pressure": ("bent", "thick"),
+    "length_offset": ("bent", "scale", "slip", "settling"),
+    "strand_friction": ("bent", "power", "contact"),
+    "coulomb_friction": ("bent", "constant"),
+    "rate_friction": ("bent", "viscous", "viscous-bent", "power", "drag"),
+    "presliding": (
+        *("bent", "rest", "sliding", "ramp", "rest-bent", "sliding-bent", "ramp-bent"),
+        *("dahl", "rest-dahl", "sliding-dahl"),
+    ),
+    "stress_softening": (
+        *("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),
+        *("power", "force-power", "test-power", "test-force-power", "virgin"),
+    ),
+    "creep": ("bent", "wall", "wall-bent", "power", "solid", "wall-power", "wall-solid"),
+    "force_drift": (
+        *("bent", "settling", "settling-bent", "tared", "tared-bent"),
+        *("power", "thermal", "return"),
+    ),
+    "pressure_droop": ("bent", "level", "level-bent", "power", "level-power", "speed"),
+    "rig_compliance": ("bent", "power", "toe"),
+    "law_shape": ("bent", "exponential"),
+    "order_too_low": ("bent", "fung", "steady"),
 }
 """Other forms of the effects, declared as ``id:form``."""
 

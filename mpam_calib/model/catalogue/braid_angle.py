@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mpam_calib.model.curves import middle_pressure, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import Normal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -24,6 +25,16 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, rest=state.rest._replace(alpha0=alpha0))
 
 
+def _seating(state: State, values: Values, setting: Setting) -> State:
+    """The strands seat themselves: the angle is off by a power of the pressure."""
+    part = power(state.pressure / middle_pressure(setting), values["seating_exponent"])
+    return _apply(state, {**values, "delta_alpha_deg": values["delta_alpha_deg"] * part}, setting)
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("seating_exponent", Normal(0.0, 0.5), "power of the pressure", "textbook", ""),)
+
+
 register(
     Effect(
         id="braid_angle",
@@ -35,6 +46,9 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
+        forms={"seating": _seating},
+        own={"seating": _exponent},
+        sources={"seating": "textbook: an angle that is off by δ·(P/P_middle)^m"},
         bends={"contraction": 1, "pressure": 2},
     )
 )

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import Parameter
+from mpam_calib.model.priors import Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
 
@@ -16,6 +18,15 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 def _apply(state: State, values: Values, setting: Setting) -> State:
     # Bent, the strands may lie outside the surface, and the radius then grows more than Eq. 2.10 says.
     return replace(state, kinematics="inextensible_braid", swell=values.get("braid_kinematics", state.swell))
+
+
+def _swell(state: State, values: Values, setting: Setting) -> State:
+    """Strands outside the wall's surface, or a wall not wholly against them: the growth times one factor."""
+    return replace(_apply(state, values, setting), swell=np.maximum(values["braid_swell"], 0.05))
+
+
+def _factor(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("braid_swell", Normal(1.0, 0.1), "the radius's growth over Eq. 2.10's", "", ""),)
 
 
 register(
@@ -29,6 +40,9 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
+        forms={"swell": _swell},
+        own={"swell": _factor},
+        sources={"swell": "Eq. 2.10 for strands a distance δ outside the wall: growth × (1 + δ/R0)"},
         bends={"contraction": 2},
     )
 )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from mpam_calib.model.curves import middle_pressure, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import HalfNormal, Parameter
+from mpam_calib.model.priors import HalfNormal, LogNormal, Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.statics import braid_energy_force
 
@@ -21,6 +22,16 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, lost=state.lost + values["braid_factor"] * loss)
 
 
+def _power(state: State, values: Values, setting: Setting) -> State:
+    """Strands that stiffen as they are pulled straight: the loss is another power of the pressure than 2."""
+    part = power(state.pressure / middle_pressure(setting), values["braid_exponent"] - 2.0)
+    return _apply(state, {**values, "braid_factor": values["braid_factor"] * part}, setting)
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("braid_exponent", LogNormal(1.7, 0.3), "power of the pressure lost", "textbook", ""),)
+
+
 register(
     Effect(
         id="braid_stretch",
@@ -33,6 +44,11 @@ register(
         apply=_apply,
         memory=False,
         needs_braid=True,
+        forms={"power": _power},
+        own={"power": _exponent},
+        sources={
+            "power": "textbook: energy in strands whose stiffness grows with tension, ∝ P^m (linear: 2)"
+        },
         bends={"contraction": 1, "pressure": 2},
         looseness=2.0,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import HalfNormal, Parameter
+from mpam_calib.model.priors import HalfNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
 SCALE = 0.2
@@ -25,6 +25,17 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, coulomb=state.coulomb + values["K_f"])
 
 
+def _constant(state: State, values: Values, setting: Setting) -> State:
+    """A part of it is the same at any force; at the force scale it is all K_f times the force."""
+    constant = values["K_f"] * values["constant_share"]
+    drag = state.drag + constant * setting.force_scale
+    return replace(state, coulomb=state.coulomb + values["K_f"] - constant, drag=drag)
+
+
+def _share(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("constant_share", Normal(0.4, 0.3), "share that is the same at any force", "", ""),)
+
+
 register(
     Effect(
         id="coulomb_friction",
@@ -39,6 +50,9 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
+        forms={"constant": _constant},
+        own={"constant": _share},
+        sources={"constant": "K|F| + a constant dry friction (Chou & Hannaford 1996)"},
         bends={"force": 1, "pressure": 2, "contraction": 1},
     )
 )

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from mpam_calib.model.curves import middle_pressure, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import NormalWithin, Parameter
+from mpam_calib.model.priors import LogNormal, Normal, NormalWithin, Parameter
 from mpam_calib.model.state import Setting, State
 
 OWN_SD = 0.1
@@ -36,6 +37,28 @@ def _soft(state: State, values: Values, setting: Setting) -> State:
     return replace(state, pressure=np.maximum(state.pressure - lost, 0.0))
 
 
+def _power(state: State, values: Values, setting: Setting) -> State:
+    """A power of the pressure, P_DB at the middle of the levels: below 0 it closes, 1 is a gauge's gain."""
+    lost = values["P_DB_kPa"] * power(state.pressure / middle_pressure(setting), values["dead_band_exponent"])
+    return replace(state, pressure=np.maximum(state.pressure - lost, 0.0))
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("dead_band_exponent", Normal(0.0, 0.5), "power of the pressure lost", "textbook", ""),)
+
+
+def _closing(state: State, values: Values, setting: Setting) -> State:
+    """The pressure that opens the bladder fades as higher pressures lay it against the braid."""
+    past = (state.pressure - middle_pressure(setting)) / values["closing_kPa"]
+    lost = values["P_DB_kPa"] * np.exp(np.clip(-past, -3.0, 3.0))
+    return replace(state, pressure=np.maximum(state.pressure - lost, 0.0))
+
+
+def _over(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LogNormal(0.7 * setting.top_pressure, 0.7)
+    return (Parameter("closing_kPa", prior, "pressure over which the dead-band closes"),)
+
+
 register(
     Effect(
         id="dead_band",
@@ -47,7 +70,12 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"soft": _soft},
+        forms={"soft": _soft, "power": _power, "closing": _closing},
+        own={"power": _exponent, "closing": _over},
+        sources={
+            "power": "textbook: P_DB·(P/P_middle)^m (0: an offset, 1: an error of the gauge's gain)",
+            "closing": "elastic threshold of the bladder (cf. Tsagarakis & Caldwell 2000), fading with P",
+        },
         bends={"pressure": 3},
     )
 )

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from mpam_calib.model.bend import EARLY
+from mpam_calib.model.curves import half_test, settled, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import LongTailed, Parameter
+from mpam_calib.model.priors import LogNormal, LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.units import MINUTE
 
@@ -35,6 +36,36 @@ def _tared(state: State, values: Values, setting: Setting) -> State:
     return replace(state, zero=state.zero + values["drift_N_per_min"] * state.readings.file_time)
 
 
+def _power(state: State, values: Values, setting: Setting) -> State:
+    """A power of time, as far at half the test: a half with diffusion of heat, 2 ever faster."""
+    half = half_test(setting)
+    path = half * signed_power(state.readings.time / half, values["drift_exponent"])
+    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("drift_exponent", LogNormal(1.0, 0.5), "power of time", "textbook", ""),)
+
+
+def _thermal(state: State, values: Values, setting: Setting) -> State:
+    """To a new balance of heat with one time constant, as far at half the test."""
+    half = half_test(setting)
+    path = half * settled(state.readings.time, values["warming_s"], half)
+    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+
+
+def _time(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LogNormal(0.6 * half_test(setting), 0.8)
+    return (Parameter("warming_s", prior, "time in which the load cell warms up"),)
+
+
+def _return(state: State, values: Values, setting: Setting) -> State:
+    """Out until half the test and back by its end: half a swing of the room's temperature."""
+    half = half_test(setting)
+    path = half * np.sin(0.5 * np.pi * state.readings.time / half)
+    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+
+
 register(
     Effect(
         id="force_drift",
@@ -45,7 +76,19 @@ register(
         source="linear in time over the whole test",
         parameters=_parameters,
         apply=_apply,
-        forms={"settling": _settling, "tared": _tared},
+        forms={
+            "settling": _settling,
+            "tared": _tared,
+            "power": _power,
+            "thermal": _thermal,
+            "return": _return,
+        },
+        own={"power": _exponent, "thermal": _time},
+        sources={
+            "power": "textbook: square root of time (heat conduction), quadratic",
+            "thermal": "textbook: Newton's law of cooling, 1 − exp(−t/τ)",
+            "return": "textbook: half a period of a sine over the test",
+        },
         kinds={
             "settling": "most of it early in the test",
             "tared": "here anew in each file, as if tared before",

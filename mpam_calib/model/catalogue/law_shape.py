@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
+from scipy import special
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import LongTailed, Parameter
+from mpam_calib.model.priors import LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
@@ -18,6 +19,9 @@ TERMS = 6
 """Polynomials beyond the law's, as far as there are levels."""
 SD = 0.3
 """Prior scale of the lowest; the n-th is smaller by n^1.5: laws of pressure are smooth."""
+
+SERIES = 8
+"""Polynomials that stand for an exponential beyond the law."""
 
 
 def _degrees(setting: Setting) -> range:
@@ -33,13 +37,39 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     )
 
 
-def _apply(state: State, values: Values, setting: Setting) -> State:
+def _place(state: State, setting: Setting) -> Array:
+    """The pressure, from −1 at the lowest level to 1 at the top."""
     low, high = float(setting.levels[0]), setting.top_pressure
-    x = (2.0 * state.readings.pressure - low - high) / max(high - low, 1.0)
+    return (2.0 * state.readings.pressure - low - high) / max(high - low, 1.0)
+
+
+def _apply(state: State, values: Values, setting: Setting) -> State:
+    x = _place(state, setting)
     gain: Array = np.ones((1, 1))
     for j in _degrees(setting):
         gain = gain + values[f"law_bend_{j}"] * legendre.legval(x, [0.0] * j + [1.0])
     return replace(state, wall_gain=state.wall_gain * gain)
+
+
+def _exponential(state: State, values: Values, setting: Setting) -> State:
+    """What an exponential of the pressure has beyond the law: ever steeper (above 0) or levelling off."""
+    if not (degrees := _degrees(setting)):
+        return state
+    first, rate = degrees[0], np.clip(values["law_curvature"], -10.0, 10.0)
+    x = np.clip(_place(state, setting), -1.5, 1.5)
+    # exp(κx) = Σ (2j + 1) i_j(κ) P_j(x), over its first part beyond the law, which κ = 0 leaves alone.
+    part, curve = np.ones((1, 1)), np.zeros((1, 1))
+    for j in range(first, first + SERIES):
+        share = special.hyp0f1(j + 1.5, 0.25 * rate**2) / special.hyp0f1(first + 1.5, 0.25 * rate**2)
+        curve = curve + part * share * legendre.legval(x, [0.0] * j + [1.0])
+        part = part * rate / (2 * j + 1)
+    return replace(state, wall_gain=state.wall_gain * (1.0 + values[f"law_bend_{first}"] * curve))
+
+
+def _curvature(setting: Setting) -> tuple[Parameter, ...]:
+    if not _degrees(setting):
+        return ()
+    return (Parameter("law_curvature", Normal(0.0, 1.5), "exponent over half the range of pressure", "", ""),)
 
 
 register(
@@ -53,6 +83,10 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
+        forms={"exponential": _exponential},
+        own={"exponential": _curvature},
+        leading={"exponential": 1},
+        sources={"exponential": "a + b·P + c·exp(dP): thesis Eq. 4.8, saturating or growing"},
         bends={"contraction": 2},
     )
 )

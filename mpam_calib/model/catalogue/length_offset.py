@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
+from mpam_calib.model.curves import half_test, settled
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import LongTailed, Parameter
+from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
 
@@ -19,6 +22,34 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, displacement=state.displacement + values["offset_mm"])
 
 
+def _scale(state: State, values: Values, setting: Setting) -> State:
+    """The crosshead's scale is off: the error goes with the stroke, and is the offset at half of it."""
+    part = state.displacement / (0.5 * setting.stroke)
+    return replace(state, displacement=state.displacement + values["offset_mm"] * part)
+
+
+def _slip(state: State, values: Values, setting: Setting) -> State:
+    """The grips slip early in the test, and then hold: the offset at half the test."""
+    part = settled(state.readings.time, values["slip_s"], half_test(setting))
+    return replace(state, displacement=state.displacement + values["offset_mm"] * part)
+
+
+def _slip_time(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LogNormal(0.4 * half_test(setting), 1.0)
+    return (Parameter("slip_s", prior, "time in which the grips settle"),)
+
+
+def _settling(state: State, values: Values, setting: Setting) -> State:
+    """There from the start, and more or less of it at first, until a fifth of the test has passed."""
+    fading = np.exp(-state.readings.time / (0.4 * half_test(setting)))
+    part = 1.0 + values["offset_excess"] * fading
+    return replace(state, displacement=state.displacement + values["offset_mm"] * part)
+
+
+def _excess(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("offset_excess", Normal(0.0, 0.7), "what is more of it at first, as a share", "", ""),)
+
+
 register(
     Effect(
         id="length_offset",
@@ -30,6 +61,14 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
+        forms={"scale": _scale, "slip": _slip, "settling": _settling},
+        own={"slip": _slip_time, "settling": _excess},
+        recalls=("slip", "settling"),
+        sources={
+            "scale": "textbook: gain error of a displacement sensor",
+            "slip": "textbook: first-order settling of a clamp, 1 − exp(−t/τ)",
+            "settling": "textbook: an offset with an exponential transient, 1 + c·exp(−t/τ)",
+        },
         bends={"contraction": 1, "settling": 3},
     )
 )

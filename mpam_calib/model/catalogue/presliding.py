@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import LogNormal, Parameter
+from mpam_calib.model.priors import LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
@@ -31,6 +31,21 @@ def _ramp(state: State, values: Values) -> Array:
     return np.maximum(1.0 - state.readings.travel / values["reversal_mm"], 0.0)
 
 
+def _dahl(state: State, values: Values) -> Array:
+    """Dahl's law with an exponent: 0 is the ramp, 1/2 Iwan's even slip, 1 the exponential, 2 a hyperbola."""
+    beyond = values["dahl_exponent"] - 1.0
+    beyond = np.where(np.abs(beyond) < SAME, SAME, beyond)
+    turn = state.readings.travel / values["reversal_mm"]
+    left = np.log1p(np.maximum(beyond * turn, NONE_LEFT - 1.0)) / beyond
+    return np.asarray(np.exp(-np.minimum(left, 700.0)))
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("dahl_exponent", Normal(1.0, 0.4), "how the friction's slope fades", "Dahl 1976", ""),)
+
+
+SAME, NONE_LEFT = 1e-6, 1e-15
+"""Exponents as near to 1 as makes no difference; a share of the turn that counts as none."""
 AGAINST, REST, SLIDING = 2.0, 1.0, 0.0
 """How far friction turns on a level's first stroke: from against it, since pressurising moved the muscle;
 from none; or not at all, since no reversal began the stroke."""
@@ -60,12 +75,20 @@ register(
             "rest": _turning(_exponential, REST),
             "sliding": _turning(_exponential, SLIDING),
             "ramp": _turning(_ramp, AGAINST),
+            "dahl": _turning(_dahl, AGAINST),
+            "rest-dahl": _turning(_dahl, REST),
+            "sliding-dahl": _turning(_dahl, SLIDING),
         },
         kinds={
             "rest": "here a level's first stroke starts from rest",
             "sliding": "here not on a level's first stroke",
             "ramp": "here in proportion to the travel",
         },
+        own=dict.fromkeys(("dahl", "rest-dahl", "sliding-dahl"), _exponent),
+        sources=dict.fromkeys(
+            ("dahl", "rest-dahl", "sliding-dahl"),
+            "Dahl 1976, exponent i after Bliman 1992; i = 1/2: Iwan 1966, Masing's rule with even slip",
+        ),
         bends={"travel": 3},
         looseness=2.0,
     )

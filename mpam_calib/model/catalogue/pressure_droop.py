@@ -5,28 +5,59 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mpam_calib.model.curves import level_stroke, power, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import HalfNormal, Parameter
+from mpam_calib.model.priors import HalfNormal, LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
+
+Array = NDArray[np.float64]
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("droop_percent", HalfNormal(0.05), "pressure missing at full stroke"),)
 
 
-def _apply(state: State, values: Values, setting: Setting) -> State:
-    part = state.displacement / setting.stroke
+def _drooped(state: State, values: Values, part: Array) -> State:
+    """With this part (B or 1, n) of the droop at full stroke."""
     return replace(state, pressure=state.pressure * (1.0 - values["droop_percent"] * part))
+
+
+def _apply(state: State, values: Values, setting: Setting) -> State:
+    return _drooped(state, values, state.displacement / setting.stroke)
 
 
 def _level(state: State, values: Values, setting: Setting) -> State:
     """In proportion to each level's own stroke."""
-    if setting.strokes is None:
-        return _apply(state, values, setting)
-    strokes = np.where(setting.strokes > 0.0, setting.strokes, setting.stroke)
-    part = state.displacement / np.interp(state.readings.pressure, setting.levels, strokes)
-    return replace(state, pressure=state.pressure * (1.0 - values["droop_percent"] * part))
+    return _drooped(state, values, state.displacement / level_stroke(state, setting))
+
+
+def _power(state: State, values: Values, setting: Setting) -> State:
+    """A power of the stroke: with its square, or all but at its end; less than 1 as the volume grows."""
+    part = signed_power(state.displacement / setting.stroke, values["droop_exponent"])
+    return _drooped(state, values, part)
+
+
+def _level_power(state: State, values: Values, setting: Setting) -> State:
+    """A power of each level's own stroke."""
+    part = signed_power(state.displacement / level_stroke(state, setting), values["droop_exponent"])
+    return _drooped(state, values, part)
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("droop_exponent", LogNormal(1.5, 0.5), "power of the stroke", "textbook", ""),)
+
+
+def _speed(state: State, values: Values, setting: Setting) -> State:
+    """More of it the faster the stroke, by a power: 1 where the line's flow is laminar, 2 where it is not."""
+    speed = np.where(state.readings.speed > 0.0, state.readings.speed / setting.speed, 1.0)
+    part = power(speed, values["flow_exponent"]) * state.displacement / setting.stroke
+    return _drooped(state, values, part)
+
+
+def _flow_exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("flow_exponent", Normal(0.5, 0.5), "power of the speed", "textbook", ""),)
 
 
 register(
@@ -40,7 +71,14 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"level": _level},
+        forms={"level": _level, "power": _power, "level-power": _level_power, "speed": _speed},
+        own={"power": _exponent, "level-power": _exponent, "speed": _flow_exponent},
+        recalls=("speed",),
+        sources={
+            "power": "textbook: quadratic in the stroke; near 0.8 in proportion to the muscle's volume",
+            "level-power": "the same over each level's own stroke",
+            "speed": "line losses: Hagen-Poiseuille ∝ flow, turbulent or orifice ∝ flow²",
+        },
         kinds={"level": "here full stroke is each level's own"},
         bends={"contraction": 3, "speed": 1},
         looseness=2.0,

@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mpam_calib.model.curves import box_cox, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import LongTailed, Parameter
+from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.friction import strand_friction_per_f_s
+
+Array = NDArray[np.float64]
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -18,9 +22,13 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     )
 
 
+def _speed(state: State, setting: Setting) -> Array:
+    """Speed over the test's mean; 1 at rest."""
+    return np.where(state.readings.speed > 0.0, state.readings.speed / setting.speed, 1.0)
+
+
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    speed = np.where(state.readings.speed > 0.0, state.readings.speed, setting.speed)
-    decades = np.log10(speed / setting.speed)
+    decades = np.log10(_speed(state, setting))
     gain = np.maximum(1.0 + values["rate_per_decade"] * decades, 0.0)
     return replace(state, friction_gain=state.friction_gain * gain)
 
@@ -30,15 +38,41 @@ def _viscous(state: State, values: Values, setting: Setting) -> State:
 
     The size is what the declared friction would grow by at the force scale, per decade at the mean speed.
     """
-    speed = np.where(state.readings.speed > 0.0, state.readings.speed, setting.speed)
+    added = values["rate_per_decade"] * _at_scale(state, setting) * _speed(state, setting) / np.log(10.0)
+    return replace(state, drag=state.drag + added)
+
+
+def _at_scale(state: State, setting: Setting) -> Array:
+    """The declared friction at the force scale, or at the top pressure, N."""
     at_scale = state.coulomb * setting.force_scale
     braid = setting.braid
     if braid is not None and np.any(state.strand):
         top = np.array([[setting.top_pressure]])
         unit = strand_friction_per_f_s(top, state.rest.L0, state.rest, braid.E_br, braid.nu_s)
         at_scale = at_scale + state.strand * unit
-    added = values["rate_per_decade"] * at_scale * (speed / setting.speed) / np.log(10.0)
+    return np.asarray(at_scale)
+
+
+def _power(state: State, values: Values, setting: Setting) -> State:
+    """A power of the speed: 0 is the logarithm, 1 a straight line, below 0 it levels off, as Stribeck's."""
+    growth = box_cox(_speed(state, setting), values["speed_exponent"]) / np.log(10.0)
+    gain = np.maximum(1.0 + values["rate_per_decade"] * growth, 0.0)
+    return replace(state, friction_gain=state.friction_gain * gain)
+
+
+def _speed_exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("speed_exponent", Normal(0.5, 0.5), "power of the speed", "textbook", ""),)
+
+
+def _drag(state: State, values: Values, setting: Setting) -> State:
+    """Beside the declared friction and the same at any force, as "viscous", but a power of the speed."""
+    speed = signed_power(_speed(state, setting), values["drag_exponent"])
+    added = values["rate_per_decade"] * _at_scale(state, setting) * speed / np.log(10.0)
     return replace(state, drag=state.drag + added)
+
+
+def _drag_exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("drag_exponent", LogNormal(0.5, 0.5), "power of the speed", "textbook", ""),)
 
 
 register(
@@ -51,7 +85,12 @@ register(
         source="logarithmic in speed, relative to the geometric mean of the test's speeds",
         parameters=_parameters,
         apply=_apply,
-        forms={"viscous": _viscous},
+        forms={"viscous": _viscous, "power": _power, "drag": _drag},
+        own={"power": _speed_exponent, "drag": _drag_exponent},
+        sources={
+            "power": "friction 1 + r(v^n − 1)/n: power law, viscous (n = 1), near Stribeck 1902 for n < 0",
+            "drag": "Herschel & Bulkley 1926: beside dry friction a part ∝ v^n",
+        },
         kinds={"viscous": "here by friction in proportion to the speed, the same at any force"},
         bends={"speed": 2},
         looseness=2.0,

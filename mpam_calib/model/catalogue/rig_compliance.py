@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
+from mpam_calib.model.curves import settled
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import HalfNormal, Parameter
+from mpam_calib.model.priors import HalfNormal, LogNormal, Parameter
 from mpam_calib.model.state import Setting, State
 
 
@@ -21,6 +24,34 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, displacement=state.displacement + values["compliance_mm_per_N"] * state.guide)
 
 
+NEAR = 0.05
+"""Share of the force scale below which a power's slope grows no further: it must be finite at no force."""
+
+
+def _power(state: State, values: Values, setting: Setting) -> State:
+    """It stiffens (or softens) with the load by a power, and gives as much at the force scale."""
+    load = state.guide / setting.force_scale
+    size = (load**2 + NEAR**2) / (1.0 + NEAR**2)
+    part = state.guide * np.clip(size, None, 2500.0) ** (0.5 * (values["compliance_exponent"] - 1.0))
+    return replace(state, displacement=state.displacement + values["compliance_mm_per_N"] * part)
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("compliance_exponent", LogNormal(0.75, 0.3), "power of the force", "textbook", ""),)
+
+
+def _toe(state: State, values: Values, setting: Setting) -> State:
+    """Soft until its slack is taken up, then stiff; it gives as much at the force scale."""
+    part = np.sign(state.guide) * settled(np.abs(state.guide), values["toe_N"], setting.force_scale)
+    give = values["compliance_mm_per_N"] * setting.force_scale * part
+    return replace(state, displacement=state.displacement + give)
+
+
+def _toe_force(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LogNormal(setting.force_scale, 0.6)
+    return (Parameter("toe_N", prior, "force that takes up the fixture's slack"),)
+
+
 register(
     Effect(
         id="rig_compliance",
@@ -33,6 +64,12 @@ register(
         apply=_apply,
         memory=False,
         uses_force=True,
+        forms={"power": _power, "toe": _toe},
+        own={"power": _exponent, "toe": _toe_force},
+        sources={
+            "power": "Hertz 1882: give ∝ F^(2/3); textbook: F^m",
+            "toe": "toe region of ropes and grips (Fung 1967): give ∝ 1 − exp(−F/F_toe)",
+        },
         bends={"force": 2},
     )
 )

@@ -4,10 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import HalfNormal, Parameter
-from mpam_calib.model.state import Setting, State
+import numpy as np
+from numpy.typing import NDArray
 
+from mpam_calib.model.curves import middle_pressure, power
+from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.priors import HalfNormal, LogNormal, Normal, Parameter
+from mpam_calib.model.state import Setting, State
+from mpam_calib.physics.kinematics import Rest, radius_inextensible_braid
+
+Array = NDArray[np.float64]
+
+HERTZIAN = 4.0 / 3.0
+"""Power of the pressure in Eq. 2.43."""
 SCALE = 0.5
 """Scale of the prior on f_s; nylon on nylon is 0.15-0.25, the loops of the thesis imply up to 0.75."""
 
@@ -25,6 +34,34 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, strand=state.strand + values["f_s"])
 
 
+def _power(state: State, values: Values, setting: Setting) -> State:
+    """Another power of the pressure than 4/3: 1 is Amontons' law, 2/3 a Hertzian contact's area."""
+    pressure = state.pressure / middle_pressure(setting)
+    part = power(pressure, values["strand_exponent"] - HERTZIAN)
+    return replace(state, strand=state.strand + values["f_s"] * part)
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("strand_exponent", LogNormal(1.0, 0.35), "power of the pressure", "textbook", ""),)
+
+
+def _spread(length: Array, rest: Rest) -> Array:
+    """(R0/R)·(L0/L) of Eq. 2.43: how the pressed surface shrinks to the strands' contact."""
+    length = np.clip(length, 0.05 * rest.L0, None)
+    return rest.R0 / radius_inextensible_braid(length, rest) * rest.L0 / length
+
+
+def _contact(state: State, values: Values, setting: Setting) -> State:
+    """Another power of the contact's spread: 0 the same along the stroke, −1 as the whole surface grows."""
+    middle = _spread(state.rest.L0 - 0.5 * setting.stroke, state.rest)
+    part = power(_spread(state.length, state.rest) / middle, values["contact_exponent"] - 1.0)
+    return replace(state, strand=state.strand + values["f_s"] * part)
+
+
+def _contact_exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("contact_exponent", Normal(0.0, 1.0), "power of the contact's spread", "", ""),)
+
+
 register(
     Effect(
         id="strand_friction",
@@ -40,6 +77,12 @@ register(
         apply=_apply,
         memory=False,
         needs_braid=True,
+        forms={"power": _power, "contact": _contact},
+        own={"power": _exponent, "contact": _contact_exponent},
+        sources={
+            "power": "Amontons ∝ P; Hertzian contacts ∝ P^(2/3) (Archard 1957); Eq. 2.43 ∝ P^(4/3)",
+            "contact": "friction ∝ pressure × contact area along the stroke (Davis & Caldwell 2006)",
+        },
         bends={"pressure": 1, "contraction": 2},
     )
 )

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
+from mpam_calib.model.curves import level_stroke
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import LongTailed, Parameter
+from mpam_calib.model.priors import LogNormal, LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
+Apply = Callable[[State, Values, Setting], State]
+
+POWERS = ("power", "force-power", "test-power", "test-force-power")
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -47,6 +53,40 @@ def _test_force(state: State, values: Values, setting: Setting) -> State:
     return replace(state, gain=state.gain * (1.0 + _excess(values, state.readings.test_cycle)))
 
 
+def _by_power(whole: bool, over_test: bool) -> Apply:
+    """The excess as a power of the cycle: slow, or all but the first cycle's alone."""
+
+    def apply(state: State, values: Values, setting: Setting) -> State:
+        cycle = state.readings.test_cycle if over_test else state.readings.cycle
+        fading = cycle ** -np.minimum(values["cycle_exponent"], 20.0)
+        gain = 1.0 + values["first_cycle_fraction"] * fading
+        if whole:
+            return replace(state, gain=state.gain * gain)
+        return replace(state, wall_gain=state.wall_gain * gain)
+
+    return apply
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("cycle_exponent", LogNormal(0.8, 0.6), "power of the cycle count", "textbook", ""),)
+
+
+def _virgin(state: State, values: Values, setting: Setting) -> State:
+    """As new on a level's first stroke; from then on the softer, the farther from its longest."""
+    new = (state.readings.cycle < 1.5) & (state.readings.sign < 0.0)
+    way = np.maximum(level_stroke(state, setting) - state.readings.displacement, 0.0) / setting.stroke
+    share = np.where(new, 1.0, special.erfc(way / values["softening_reach"]))
+    return replace(state, wall_gain=state.wall_gain * (1.0 + values["first_cycle_fraction"] * share))
+
+
+def _reach(setting: Setting) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "softening_reach", LogNormal(0.3, 0.5), "share of the stroke over which it softens", "", ""
+        ),
+    )
+
+
 register(
     Effect(
         id="stress_softening",
@@ -57,7 +97,19 @@ register(
         source="exponential in the cycle count: bladder stress × (1 + fraction·e^(1 − cycle))",
         parameters=_parameters,
         apply=_apply,
-        forms={"force": _force, "test": _test, "test-force": _test_force},
+        forms={
+            "force": _force,
+            "test": _test,
+            "test-force": _test_force,
+            "power": _by_power(whole=False, over_test=False),
+            "force-power": _by_power(whole=True, over_test=False),
+            "test-power": _by_power(whole=False, over_test=True),
+            "test-force-power": _by_power(whole=True, over_test=True),
+            "virgin": _virgin,
+        },
+        own=dict.fromkeys(POWERS, _exponent) | {"virgin": _reach},
+        sources=dict.fromkeys(POWERS, "textbook: power of the cycle count (steep: the first cycle alone)")
+        | {"virgin": "Ogden & Roxburgh 1999, with the distance to the longest stroke in place of energies"},
         kinds={
             "force": "here the whole muscle, not the bladder alone",
             "test": "here in the first cycles of the whole test, not of each level",

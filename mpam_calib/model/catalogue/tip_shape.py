@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
+from mpam_calib.model.curves import middle_shape, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.priors import LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.kinematics import SHAPES, tip_shortened_length
 
@@ -22,6 +25,26 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, length=tip_shortened_length(state.length, R, state.rest, values["tip_factor"]))
 
 
+def _power(state: State, values: Values, setting: Setting) -> State:
+    """A power of the radius's growth: its square for a flat arc, near none for ends that are lost at once."""
+    middle = np.maximum(middle_shape(state, setting).R - state.rest.R0, 1e-3 * state.rest.R0)
+    growth = (SHAPES[state.kinematics](state.length, state.rest).R - state.rest.R0) / middle
+    R = state.rest.R0 + middle * signed_power(growth, values["tip_exponent"])
+    return replace(state, length=tip_shortened_length(state.length, R, state.rest, values["tip_factor"]))
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("tip_exponent", LogNormal(1.0, 0.4), "power of the radius's growth", "textbook", ""),)
+
+
+def _round(state: State, values: Values, setting: Setting) -> State:
+    """The ends are caps of the whole radius: the lost length goes with R, not with its growth."""
+    middle = middle_shape(state, setting).R
+    share = (middle - state.rest.R0) / middle
+    R = state.rest.R0 + share * SHAPES[state.kinematics](state.length, state.rest).R
+    return replace(state, length=tip_shortened_length(state.length, R, state.rest, values["tip_factor"]))
+
+
 register(
     Effect(
         id="tip_shape",
@@ -33,6 +56,12 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
+        forms={"power": _power, "round": _round},
+        own={"power": _exponent},
+        sources={
+            "power": "textbook: sagitta of an arc over a fixed end, (R − R0)²; a cone of fixed slope, R − R0",
+            "round": "textbook: hemispherical or elliptical end caps, a length in proportion to R",
+        },
         bends={"contraction": 4},
         looseness=2.0,
     )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from mpam_calib.model.curves import middle_shape, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.priors import LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
 
@@ -15,6 +16,19 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, wall_factor=state.wall_factor * (1.0 - values["wall_factor"]))
+
+
+def _thick(state: State, values: Values, setting: Setting) -> State:
+    """A thick wall carries more of it than a thin one: the share goes with a power of t/R."""
+    assert state.shape is not None
+    middle = middle_shape(state, setting)
+    ratio = (state.shape.t / state.shape.R) / (middle.t / middle.R)
+    share = values["wall_factor"] * power(ratio, values["thickness_exponent"])
+    return _apply(state, {**values, "wall_factor": share}, setting)
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("thickness_exponent", LogNormal(1.0, 0.4), "power of thickness over radius", "", ""),)
 
 
 register(
@@ -28,6 +42,9 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
+        forms={"thick": _thick},
+        own={"thick": _exponent},
+        sources={"thick": "thick-walled cylinder: the stress's fall across the wall ∝ t/R (Lamé 1852)"},
         bends={"contraction": 2, "pressure": 2},
     )
 )
