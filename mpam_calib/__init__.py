@@ -12,7 +12,16 @@ if TYPE_CHECKING:
     from mpam_calib.calibration import Calibration, calibrate
     from mpam_calib.errors import InputError, Interrupted, MpamError
     from mpam_calib.model.effect import Effect, Stage, known_effects, register
-    from mpam_calib.model.priors import HalfNormal, LogNormal, LogUniform, Normal, Parameter, Uniform
+    from mpam_calib.model.priors import (
+        HalfLongTailed,
+        HalfNormal,
+        LogNormal,
+        LogUniform,
+        LongTailed,
+        Normal,
+        Parameter,
+        Uniform,
+    )
     from mpam_calib.prediction.simulate import Simulated, simulate
     from mpam_calib.specimen import Specimen, read
 
@@ -21,11 +30,13 @@ if TYPE_CHECKING:
 _HOME: Final = {
     "Calibration": "calibration",
     "Effect": "model.effect",
+    "HalfLongTailed": "model.priors",
     "HalfNormal": "model.priors",
     "InputError": "errors",
     "Interrupted": "errors",
     "LogNormal": "model.priors",
     "LogUniform": "model.priors",
+    "LongTailed": "model.priors",
     "MpamError": "errors",
     "Normal": "model.priors",
     "Parameter": "model.priors",
@@ -44,11 +55,13 @@ _HOME: Final = {
 __all__ = [
     "Calibration",
     "Effect",
+    "HalfLongTailed",
     "HalfNormal",
     "InputError",
     "Interrupted",
     "LogNormal",
     "LogUniform",
+    "LongTailed",
     "MpamError",
     "Normal",
     "Parameter",

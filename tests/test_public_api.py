@@ -17,11 +17,13 @@ ROOT = Path(__file__).resolve().parents[1]
 NAMES = [
     "Calibration",
     "Effect",
+    "HalfLongTailed",
     "HalfNormal",
     "InputError",
     "Interrupted",
     "LogNormal",
     "LogUniform",
+    "LongTailed",
     "MpamError",
     "Normal",
     "Parameter",

@@ -163,8 +163,8 @@ def _cause(diagnosis: Diagnosis, identifier: str, seed: int) -> dict[str, Any]:
             "q05": _round(float(q05)),
             "q95": _round(float(q95)),
         }
-        sd = declared.get(identifier, 0.0)
-        within = sd > 0.0 and abs(float(values.mean())) <= 2.0 * sd
+        if number == 0:  # the size itself; the others shape it
+            within = abs(float(values.mean())) <= 2.0 * declared.get(identifier, 0.0)
     return {
         "id": identifier,
         "form": written.partition(":")[2],

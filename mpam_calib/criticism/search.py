@@ -21,7 +21,7 @@ from mpam_calib.criticism.doubt import DOUBTS
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
 from mpam_calib.criticism.spread import Alone, Spread, held_problem, spread_over
-from mpam_calib.model.bend import FORM, is_bend
+from mpam_calib.model.bend import is_bend
 from mpam_calib.model.effect import effect
 
 Array = NDArray[np.float64]
@@ -31,9 +31,9 @@ Try = tuple[tuple[str, ...], dict[str, float]]
 
 RATE = 0.001
 """Prior odds of one more cause: a passenger must not come close to the set that it rides on."""
-BENT = 2.0
-"""Nats by which an equation as it is written is likelier than a bent one: a rival that must bend in all its
-parts is not to come close to causes that follow theirs."""
+FORM_SHARES = (0.5, 0.4, 0.1)
+"""Prior shares of an effect's forms: its equation as it is written, other equations for it, bent ones. A
+rival that must bend in all its parts is not to come close to causes that follow an equation."""
 WIDTH = 6
 """Sets of each size that are extended further."""
 LEADING_SHARE = 3
@@ -123,9 +123,9 @@ class Search:
         forms = tuple(choice[e] for e in sorted(effects))
         tries: list[Try] = [(forms, start), (forms, {})]
         if len(effects) == 2:
-            # Alone, a cause may have taken another kind of shape for want of its partner.
+            # Alone, a cause may have taken another shape for want of its partner.
             for e in sorted(effects):
-                others = [f for f in flexible(e) if f != flexible_like(choice[e])]
+                others = [f for f in flexible(e) if f != choice[e]]
                 tries += [(tuple((choice | {e: form}).values()), {}) for form in others]
         return tries
 
@@ -312,7 +312,11 @@ def _better(
 def _price(form: str) -> float:
     """Nats that one form costs: its share of the prior among the effect's forms."""
     identifier, _, name = form.partition(":")
-    return log(len(forms_of(identifier))) + (BENT if name.endswith(FORM) else 0.0)
+    item = effect(identifier)
+    counts = (1, len(item.forms), len(item.bent_forms))
+    kind = 2 if name in item.bent_forms else 1 if name else 0
+    total = sum(share for share, count in zip(FORM_SHARES, counts, strict=True) if count)
+    return log(total * counts[kind] / FORM_SHARES[kind])
 
 
 def _polish(found: Search, sets: Iterable[Set]) -> None:
@@ -323,15 +327,6 @@ def _polish(found: Search, sets: Iterable[Set]) -> None:
 def flexible(identifier: str) -> tuple[str, ...]:
     """The forms that hold most shapes of an effect, one of every kind."""
     return tuple(f"{identifier}:{form}" for form in effect(identifier).bent_forms) or (identifier,)
-
-
-def flexible_like(form: str) -> str:
-    """The one of an effect's flexible forms that holds this form."""
-    identifier, _, name = form.partition(":")
-    kind = name.removesuffix(FORM).removesuffix("-")
-    return next(
-        (f for f in flexible(identifier) if f == f"{identifier}:{kind}-{FORM}"), flexible(identifier)[0]
-    )
 
 
 def forms_of(identifier: str) -> tuple[str, ...]:

@@ -152,7 +152,8 @@ def bent(item: Effect) -> Effect:
             bent_sizes = {name: size * factor for name, size in sizes.items()}
         return item.apply(state, {**values, **bent_sizes}, setting)
 
-    return replace(item, parameters=parameters, apply=apply, memory=True)
+    by_force = item.uses_force or "force" in item.bends
+    return replace(item, parameters=parameters, apply=apply, memory=True, uses_force=by_force)
 
 
 def known_effects() -> tuple[str, ...]:

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 _FAR = 8.0
 """|u| beyond which a bounded prior is numerically at its bound."""
+_WIDE = 12.0
+"""z beyond which a normal density counts for nothing in an integral."""
 
 
 TAIL = 0.7
@@ -203,6 +205,39 @@ class HalfNormal:
     def widened(self, factor: float) -> HalfNormal:
         """Zero stays the bound."""
         return HalfNormal(factor * self.scale)
+
+
+@dataclass(frozen=True)
+class HalfLongTailed:
+    """|LongTailed(scale)|: a size with one sign, of which nobody knows how large it can be."""
+
+    scale: float
+
+    def from_normal(self, u: Array) -> Array:
+        """The half-normal's value, its tail drawn out as :class:`LongTailed` does."""
+        return LongTailed(self.scale).from_normal(HalfNormal(1.0).from_normal(u))
+
+    def to_normal(self, x: Array) -> Array:
+        """Inverse of :meth:`from_normal`."""
+        return HalfNormal(1.0).to_normal(LongTailed(self.scale).to_normal(x))
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation (by quadrature)."""
+        whole = LongTailed(self.scale)
+        nodes, weights = np.polynomial.legendre.leggauss(80)
+        z = 0.5 * _WIDE * (nodes + 1.0)
+        density = np.sqrt(2.0 / np.pi) * np.exp(-0.5 * z**2)
+        mean = 0.5 * _WIDE * float(weights @ (density * whole.from_normal(z)))
+        return float(np.sqrt(whole.sd**2 - mean**2))
+
+    def describe(self, factor: float = 1.0) -> str:
+        """One phrase."""
+        return f"half of a long-tailed one (sinh-arcsinh, scale {self.scale / factor:.4g})"
+
+    def widened(self, factor: float) -> HalfLongTailed:
+        """Zero stays the bound."""
+        return HalfLongTailed(factor * self.scale)
 
 
 @dataclass(frozen=True)

@@ -194,10 +194,13 @@ def _causes(causes: list[dict[str, Any]]) -> list[Block]:
 
 
 def _meaning(identifier: str, form: str) -> str:
-    """The effect's sentence, and what its form takes otherwise."""
+    """The effect's sentence, what its form takes otherwise, and whose equation that is."""
     item = effect(identifier)
-    words = item.kinds.get(form.removesuffix(FORM).removesuffix("-"))
-    return f"{item.sentence} ({words})" if words else item.sentence
+    plain = form.removesuffix(FORM).removesuffix("-")
+    kinds = [k for k in item.kinds if plain == k or plain.startswith(f"{k}-")]
+    words = [item.kinds[max(kinds, key=len)]] if kinds else []
+    words += [f"equation: {item.sources[plain]}"] if plain in item.sources else []
+    return f"{item.sentence} ({'; '.join(words)})" if words else item.sentence
 
 
 def _alternatives(content: dict[str, Any]) -> list[Block]:

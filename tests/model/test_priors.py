@@ -9,6 +9,7 @@ from scipy import integrate, special, stats
 from mpam_calib.model.model import build_model
 from mpam_calib.model.priors import (
     TAIL,
+    HalfLongTailed,
     HalfNormal,
     LogNormal,
     LogUniform,
@@ -35,7 +36,23 @@ class SinhArcsinh(stats.rv_continuous):
         return special.ndtr(-np.sinh(delta * np.arcsinh(x)))
 
 
+class FoldedSinhArcsinh(SinhArcsinh):
+    """Its absolute value."""
+
+    def _pdf(self, x, delta):
+        return 2.0 * super()._pdf(x, delta)
+
+    def _cdf(self, x, delta):
+        return 1.0 - self._sf(x, delta)
+
+    def _sf(self, x, delta):
+        return 2.0 * super()._sf(x, delta)
+
+
+FOLDED = FoldedSinhArcsinh(name="folded_sinh_arcsinh", a=0.0)
+
 CASES = {
+    "half long-tailed": (HalfLongTailed(0.4), FOLDED(TAIL, scale=0.4 * TAIL)),
     "long-tailed": (LongTailed(0.4), SinhArcsinh(name="sinh_arcsinh")(TAIL, scale=0.4 * TAIL)),
     "normal": (Normal(3.0, 2.0), stats.norm(3.0, 2.0)),
     "below": (NormalWithin(1.0, 2.0, -np.inf, 2.5), stats.truncnorm(-np.inf, 0.75, 1.0, 2.0)),
@@ -119,6 +136,7 @@ def test_widened_priors():
         assert Normal(3.0, 2.0).widened(factor) == Normal(3.0, factor * 2.0)
         assert LogNormal(0.2, 0.7).widened(factor) == LogNormal(0.2, factor * 0.7)
         assert LongTailed(0.2).widened(factor) == LongTailed(factor * 0.2)
+        assert HalfLongTailed(0.2).widened(factor) == HalfLongTailed(factor * 0.2)
         assert HalfNormal(0.2).widened(factor).sd == pytest.approx(factor * HalfNormal(0.2).sd)
         assert Uniform(-1.0, 4.0).widened(factor) == Uniform(-1.0, -1.0 + factor * 5.0)
         within = NormalWithin(0.5, 2.0, -0.5, np.inf).widened(factor)

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 from mpam_calib.model.curves import middle_pressure, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import HalfNormal, LogNormal, Parameter
+from mpam_calib.model.priors import HalfLongTailed, LogNormal, Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.statics import braid_energy_force
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
-    return (Parameter("braid_factor", HalfNormal(2.0), "multiple of Eq. 2.25", "thesis Eq. 2.25", ""),)
+    return (Parameter("braid_factor", HalfLongTailed(2.0), "multiple of Eq. 2.25", "thesis Eq. 2.25", ""),)
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:

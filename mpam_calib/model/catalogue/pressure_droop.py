@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.curves import level_stroke, power, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import HalfNormal, LogNormal, Normal, Parameter
+from mpam_calib.model.priors import HalfLongTailed, LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
-    return (Parameter("droop_percent", HalfNormal(0.05), "pressure missing at full stroke"),)
+    return (Parameter("droop_percent", HalfLongTailed(0.05), "pressure missing at full stroke"),)
 
 
 def _drooped(state: State, values: Values, part: Array) -> State:

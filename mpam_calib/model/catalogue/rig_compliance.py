@@ -8,7 +8,7 @@ import numpy as np
 
 from mpam_calib.model.curves import settled
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import HalfNormal, LogNormal, Parameter
+from mpam_calib.model.priors import HalfLongTailed, LogNormal, Parameter
 from mpam_calib.model.state import Setting, State
 
 
@@ -16,7 +16,9 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     # 2 % of the length at the force scale: a soft fixture, not a broken one.
     scale = 0.02 * setting.geometry.L0 / setting.force_scale
     return (
-        Parameter("compliance_mm_per_N", HalfNormal(scale), "shortening that the fixture hides, per newton"),
+        Parameter(
+            "compliance_mm_per_N", HalfLongTailed(scale), "shortening that the fixture hides, per newton"
+        ),
     )
 
 
