@@ -41,14 +41,17 @@ STROKE_SHARE = 0.35
 """Size of each stroke's own part of the remainder, as a share of the common part."""
 PRESSURE_LENGTH = 0.08
 """Distance in pressure (share of the top level) over which the remainder changes."""
-LONG, FAST_SHARE = 0.04, 0.3
-"""A row longer than this share of the stroke, or of its way since the turn, is looked at in two places."""
+LONG, FAST_SHARE, CURVED = 0.04, 0.3, 0.1
+"""A row longer than this share of the stroke, or of its way since the turn, or along which the force is
+curved by more than this share of the row's noise, is looked at in two places."""
 ALIKE, APART = 0.9, 0.5
 """How alike the rests of two strokes are, and the share of what is left that every bin of a rest has by
 itself: friction fades on the way into a rest, and in it."""
 FORCE_MAP_NOISE = 0.003
 """Noise of a static reading as a share of the force scale, where no sensor sd is declared."""
 
+SANE = 3.0
+"""Prior sds beyond which moduli are not believed to bend as they say."""
 INHERITED = ("model", "lean", "bow", "root", "axes", "spreads", "log_dets")
 """What other forces do not change, or hardly."""
 
@@ -105,14 +108,16 @@ class Problem:
     def lean(self) -> tuple[Readings, Ints, Ints]:
         """The readings (m,) that a fit needs, and the two (n,) whose mean each row is.
 
-        A row's middle is enough where the row is short, and not next to a turn, where the friction changes.
+        A row's middle is enough where the row is short, the force straight, and no turn is near, where the
+        friction changes.
         """
         n = len(self)
         x, travel = self.readings.displacement, self.readings.travel
         width = np.abs(x[n:] - x[:n])
         assert self.model.setting is not None
-        long = width > LONG * self.model.setting.stroke
-        both = long | (width > FAST_SHARE * np.minimum(travel[n:], travel[:n]))
+        both = width > LONG * self.model.setting.stroke
+        both |= width > FAST_SHARE * np.minimum(travel[n:], travel[:n])
+        both |= np.abs(self._curvature) > CURVED * np.sqrt(np.diagonal(self.noise))
         one, two = np.flatnonzero(~both), np.flatnonzero(both)
         readings = Readings.join(
             [self.middle().take(one), self.readings.take(two), self.readings.take(two + n)]
@@ -132,31 +137,30 @@ class Problem:
     def bow(self) -> Array:
         """What the mean force of each row (n,) is above the force at its places in ``lean``, N.
 
-        The curvature within a row, from the declared simulation with its moduli fitted: effects hardly
-        change it.
+        From the declared simulation: effects hardly change it where it is small.
         """
+        _, first, second = self.lean
+        return np.where(first == second, self._curvature, 0.0)
+
+    @cached_property
+    def _curvature(self) -> Array:
+        """What the mean force of each row (n,) is above that in its middle, N: the declared simulation's."""
         chain, n = self.model.chain, len(self)
         assert chain is not None
         values = {p.name: p.prior.from_normal(np.zeros((1, 1))) for p in chain.parameters} or {
             "": np.zeros((1, 1))
         }
-        force = np.concatenate([self.force, self.force])
-
-        def at(readings: Readings, guide: Array) -> tuple[Array, Array]:
-            terms = chain.terms(values, readings, guide)
-            m = len(readings)
-            columns = np.broadcast_to(terms.columns, (1, m, chain.linear_size))[0]
-            return np.broadcast_to(terms.fixed, (1, m))[0], columns
-
-        fixed, columns = at(self.readings, force)
+        readings = Readings.join([self.readings, self.middle()])
+        terms = chain.terms(values, readings, np.tile(self.force, 3))
+        fixed = np.broadcast_to(terms.fixed, (1, 3 * n))[0]
+        columns = np.broadcast_to(terms.columns, (1, 3 * n, chain.linear_size))[0]
         X = columns / self.noise_level.total
-        residual = (force - fixed) / self.noise_level.total
+        residual = (np.tile(self.force, 3) - fixed) / self.noise_level.total
         eta = linalg.solve(X.T @ X + np.eye(X.shape[1]), X.T @ residual) if X.shape[1] else np.zeros(0)
-        whole = fixed + columns @ eta
-        readings, first, second = self.lean
-        fixed, columns = at(readings, self.at_lean(self.force))
-        lean = fixed + columns @ eta
-        return np.asarray(0.5 * (whole[:n] + whole[n:]) - 0.5 * (lean[first] + lean[second]))
+        # Moduli far out of their prior stand in for something that is bent elsewhere.
+        eta = eta * min(1.0, SANE / max(float(np.abs(eta).max(initial=0.0)), SANE))
+        low, high, middle = (fixed + columns @ eta).reshape(3, n)
+        return np.asarray(0.5 * (low + high) - middle)
 
     def take(self, rows: NDArray[np.bool_]) -> Problem:
         """The problem on some of its rows (a fold)."""

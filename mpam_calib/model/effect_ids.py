@@ -30,7 +30,7 @@ EFFECT_IDS: Final[tuple[str, ...]] = (
 EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(EFFECT_IDS, ("bent",)),
     "dead_band": ("bent", "soft", "power", "closing"),
-    "tip_shape": ("bent", "power", "round"),
+    "tip_shape": ("bent", "working", "power", "round"),
     "braid_kinematics": ("bent", "swell"),
     "braid_angle": ("bent", "seating"),
     "braid_stretch": ("bent", "power"),

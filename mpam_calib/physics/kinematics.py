@@ -100,3 +100,23 @@ SHAPES = {
     "constant_thickness": shape_constant_thickness,
 }
 """The two kinematics by their declared names."""
+
+NEWTON_STEPS = 6
+FLATTEST = 0.1
+"""Least slope in these steps: where longer tips leave no working length at all they must end somewhere."""
+
+
+def tip_shortened_length_of_its_own(L: Array, kinematics: str, rest: Rest, factor: Array) -> Array:
+    """Working length (m) whose own radius rounds the tips: L′ = L − 2·factor·(π/2 − 1)(R(L′) − R0).
+
+    Eq. 2.47 with the radius of Eq. 2.10 or 4.16 at L′ in place of that at L; by Newton's method.
+    """
+    shape, least, step = SHAPES[kinematics], 0.05 * rest.L0, 1e-5 * rest.L0
+    working = L
+    for _ in range(NEWTON_STEPS):
+        at = np.maximum(working, least)
+        R, further = shape(at, rest).R, shape(at + step, rest).R
+        gap = working - tip_shortened_length(L, R, rest, factor)
+        slope = 1.0 + 2.0 * factor * (np.pi / 2.0 - 1.0) * (further - R) / step
+        working = working - gap / np.maximum(slope, FLATTEST)
+    return np.asarray(working)

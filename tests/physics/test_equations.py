@@ -18,6 +18,7 @@ from mpam_calib.physics.kinematics import (
     radius_inextensible_braid,
     tan2_braid_angle,
     tip_shortened_length,
+    tip_shortened_length_of_its_own,
     wall_at_constant_volume,
 )
 from mpam_calib.physics.statics import (
@@ -208,6 +209,17 @@ def test_2_47_takes_length_in_proportion_to_the_bulge():
     )
     assert float(tip_shortened_length(L, R, rest, np.asarray(0.0))) == 0.04
     assert float(tip_shortened_length(L, rest.R0, rest, np.asarray(3.0))) == 0.04
+
+
+def test_tips_whose_radius_is_that_of_the_working_length_solve_2_47_for_it():
+    rest = Rest(*(np.asarray(v) for v in (0.05, 0.003, 0.0007, math.radians(72.0))))
+    L = np.linspace(0.036, 0.05, 8)[None, :]
+    factor = np.array([[-0.5], [0.0], [0.5], [1.0]])
+    for kinematics, shape in SHAPES.items():
+        working = tip_shortened_length_of_its_own(L, kinematics, rest, factor)
+        again = tip_shortened_length(L, shape(working, rest).R, rest, factor)
+        np.testing.assert_allclose(again, working, atol=1e-9)
+        np.testing.assert_array_equal(working[1], L[0])
 
 
 def test_3_16_at_the_published_optimum():

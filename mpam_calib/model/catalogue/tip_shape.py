@@ -10,7 +10,11 @@ from mpam_calib.model.curves import middle_shape, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
-from mpam_calib.physics.kinematics import SHAPES, tip_shortened_length
+from mpam_calib.physics.kinematics import (
+    SHAPES,
+    tip_shortened_length,
+    tip_shortened_length_of_its_own,
+)
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -23,6 +27,12 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 def _apply(state: State, values: Values, setting: Setting) -> State:
     R = SHAPES[state.kinematics](state.length, state.rest).R
     return replace(state, length=tip_shortened_length(state.length, R, state.rest, values["tip_factor"]))
+
+
+def _working(state: State, values: Values, setting: Setting) -> State:
+    """The radius that rounds the tips is that of the working length itself."""
+    length = tip_shortened_length_of_its_own(state.length, state.kinematics, state.rest, values["tip_factor"])
+    return replace(state, length=length)
 
 
 def _power(state: State, values: Values, setting: Setting) -> State:
@@ -56,9 +66,10 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"power": _power, "round": _round},
+        forms={"working": _working, "power": _power, "round": _round},
         own={"power": _exponent},
         sources={
+            "working": "thesis Eq. 2.47 with the radius at L′ in place of that at L",
             "power": "textbook: sagitta of an arc over a fixed end, (R − R0)²; a cone of fixed slope, R − R0",
             "round": "textbook: hemispherical or elliptical end caps, a length in proportion to R",
         },
