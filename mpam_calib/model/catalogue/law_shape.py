@@ -20,6 +20,7 @@ TERMS = 6
 SD = 0.3
 """Prior scale of the lowest; the n-th is smaller by n^1.5: laws of pressure are smooth."""
 
+LEVEL = "law_bend_0"
 SERIES = 8
 """Polynomials that stand for an exponential beyond the law."""
 
@@ -30,11 +31,19 @@ def _degrees(setting: Setting) -> range:
     return range(first, min(first + TERMS, len(setting.levels)))
 
 
+def _level(setting: Setting) -> tuple[Parameter, ...]:
+    """A tensile test says what the moduli are without pressure, and nothing of their mean under it."""
+    if setting.simulation.moduli == "loops" or not _degrees(setting):
+        return ()
+    return (Parameter(LEVEL, LongTailed(SD), "what the moduli are more on average than declared", "", ""),)
+
+
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
-    return tuple(
+    bends = tuple(
         Parameter(f"law_bend_{j}", LongTailed(SD / number**1.5), f"part of degree {j} in pressure", "", "")
         for number, j in enumerate(_degrees(setting), start=1)
     )
+    return (*bends, *_level(setting))
 
 
 def _place(state: State, setting: Setting) -> Array:
@@ -45,7 +54,7 @@ def _place(state: State, setting: Setting) -> Array:
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
     x = _place(state, setting)
-    gain: Array = np.ones((1, 1))
+    gain: Array = 1.0 + values.get(LEVEL, np.zeros((1, 1)))
     for j in _degrees(setting):
         gain = gain + values[f"law_bend_{j}"] * legendre.legval(x, [0.0] * j + [1.0])
     return replace(state, wall_gain=state.wall_gain * gain)
@@ -63,13 +72,17 @@ def _exponential(state: State, values: Values, setting: Setting) -> State:
         share = special.hyp0f1(j + 1.5, 0.25 * rate**2) / special.hyp0f1(first + 1.5, 0.25 * rate**2)
         curve = curve + part * share * legendre.legval(x, [0.0] * j + [1.0])
         part = part * rate / (2 * j + 1)
-    return replace(state, wall_gain=state.wall_gain * (1.0 + values[f"law_bend_{first}"] * curve))
+    gain = 1.0 + values.get(LEVEL, np.zeros((1, 1))) + values[f"law_bend_{first}"] * curve
+    return replace(state, wall_gain=state.wall_gain * gain)
 
 
 def _curvature(setting: Setting) -> tuple[Parameter, ...]:
     if not _degrees(setting):
         return ()
-    return (Parameter("law_curvature", Normal(0.0, 1.5), "exponent over half the range of pressure", "", ""),)
+    curvature = Parameter(
+        "law_curvature", Normal(0.0, 1.5), "exponent over half the range of pressure", "", ""
+    )
+    return (*_level(setting), curvature)
 
 
 register(
