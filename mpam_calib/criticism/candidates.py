@@ -61,16 +61,9 @@ def _why_not(identifier: str, problem: Problem) -> str | None:
         speed = speed[speed > 0.0]
         if not len(speed) or speed.max() < SPEEDS_APART * speed.min():
             return "one speed"
-    if identifier in ("rate_friction", "presliding") and not _has_friction(problem):
-        return "the simulation has no friction to change"
     levels = len(np.unique(problem.level))
     if levels < LEVELS.get(identifier, 1):
         return f"{levels} pressure level" + ("s" if levels > 1 else "")
     if identifier in ("law_shape", "order_too_low") and simulation.law == "free":
         return "the law is free at every level" if identifier == "law_shape" else None
     return None
-
-
-def _has_friction(problem: Problem) -> bool:
-    simulation = problem.blueprint.simulation
-    return simulation.friction != "none" or any(e.endswith("_friction") for e in simulation.effect_ids)

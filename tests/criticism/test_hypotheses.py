@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -111,6 +112,15 @@ def test_what_cannot_be_tested_is_said(null_problem: Problem) -> None:
     everything = candidates(null_problem)
     assert not set(everything.tested) & set(dict(everything.not_tested))
     assert f"{null_problem.blueprint.simulation.friction}_friction" not in everything.tested
+
+
+def test_friction_that_is_itself_a_cause_may_turn_over_or_depend_on_speed(null_problem: Problem) -> None:
+    """Where no friction is declared the one that is found may have every property of one that is."""
+    simulation = null_problem.blueprint.simulation.model_copy(update={"friction": "none"})
+    blueprint = null_problem.blueprint.model_copy(update={"simulation": simulation})
+    tested = candidates(replace(null_problem, blueprint=blueprint)).tested
+    assert {"coulomb_friction", "presliding"} <= set(tested)
+    assert ("rate_friction" in tested) == ("rate_friction" in candidates(null_problem).tested)
 
 
 def test_noise_is_found_before_any_model(null_problem: Problem) -> None:
