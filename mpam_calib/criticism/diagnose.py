@@ -69,6 +69,7 @@ def diagnose(
     problem = build_problem(specimen, blueprint)
     tested = candidates(problem)
     found = search(problem, tested.tested, lambda share: listener("searching", share), workers=WORKERS)
+    problem = found.problem  # its noise settled by the best set
     verdict = judge(found)
     for size in range(len(SIZES)):
         found.refit(verdict.standing, size)
@@ -118,8 +119,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "saturated_share": _round(diagnosis.problem.saturated),
         "repeating_N": _round(verdict.repeating),
         "searched": {
-            "sets": len({effects for effects, _ in diagnosis.search.searched}),
-            "refits": len(diagnosis.search.searched),
+            "sets": len(diagnosis.search.seen | {effects for effects, _ in diagnosis.search.searched}),
             "largest": LARGEST,
         },
     }

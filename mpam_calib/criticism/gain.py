@@ -108,7 +108,7 @@ def _fold(
     problem: Problem, tested: tuple[str, ...], named: Fit, held: NDArray[np.bool_], workers: int
 ) -> _Fold:
     # Workers share one fold's search: three folds on two workers would leave one idle.
-    found = search(problem.take(~held), tested, width=FOLD_WIDTH, workers=workers)
+    found = search(problem.take(~held), tested, width=FOLD_WIDTH, workers=workers, settle=False)
     # What a verdict on these rows alone would report: in "unexplained", only what stands even so.
     chosen = judge(found).standing
     found.refit_all((chosen, size) for size in range(len(SIZES)))

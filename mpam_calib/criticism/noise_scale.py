@@ -1,10 +1,11 @@
-"""How large the noise is, put right by what the most flexible models leave of the rows.
+"""How large the noise is, put right by what the best models leave of the rows.
 
 Before any model is fitted, windows of consecutive readings tell the noise; short strokes leave short windows,
 and what they say of correlated noise at the length of a reduced row is good to some tens of percent. That
-matters: all evidences are as sharp as the noise is small. A model whose moduli are free at every level leaves
-of hundreds of rows little but noise. Its evidence as a function of a common scale on the noise's sd, with the
-remainder's sizes summed over, is combined with the windows' own uncertainty; the maximum is taken for all.
+matters: all evidences are as sharp as the noise is small. A model whose moduli are free at every level, or
+that has the right causes, leaves of hundreds of rows little but noise. Its evidence as a function of a common
+scale on the noise's sd, with the remainder's sizes summed over, is combined with the windows' own
+uncertainty; the maximum is taken for all.
 """
 
 from __future__ import annotations
@@ -46,6 +47,25 @@ def settle_noise(problem: Problem, space: Sequence[Simulation]) -> Problem:
     ]
     posterior = np.array(each) - 0.5 * (LOG_SCALES / WINDOWS_SD) ** 2
     return problem.with_noise_scale(float(np.exp(_top(LOG_SCALES, posterior))))
+
+
+def noise_scale(problem: Problem, fits: Sequence[Fit]) -> float:
+    """The scale on the noise's sd that one model's fits (one for each size of the remainder) ask for.
+
+    At their modes: ln p(y | s) = ln N(residual; 0, s² noise + remainder) + k ln s, where k is the number of
+    parameters that the data settle, whose widths go with s.
+    """
+    axes, powers, _ = problem.axes
+    terms = []
+    for f in fits:
+        residual = axes @ (problem.force - f.force - f.doubt)
+        variance = np.exp(2.0 * LOG_SCALES)[:, None] + (SIZES[f.size] * problem.force_scale) ** 2 * powers
+        settled = len(f.covariance) - float(np.trace(f.covariance))
+        change = -0.5 * np.sum(residual**2 / variance + np.log(variance), axis=1) + settled * LOG_SCALES
+        change -= change[len(LOG_SCALES) // 2]
+        terms.append(f.log_evidence + log(SIZE_PRIOR[f.size]) + change)
+    posterior = np.logaddexp.reduce(terms, axis=0) - 0.5 * (LOG_SCALES / WINDOWS_SD) ** 2
+    return float(np.exp(_top(LOG_SCALES, posterior)))
 
 
 def _fits(problem: Problem, blueprint: Blueprint, starts: dict[int, dict[str, float]]) -> dict[int, Fit]:

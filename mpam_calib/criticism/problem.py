@@ -185,15 +185,12 @@ class Problem:
         return made
 
     def with_noise_scale(self, scale: float) -> Problem:
-        """The same with a noise whose sd is ``scale`` times as large."""
+        """The same with rows whose noise has an sd ``scale`` times as large.
+
+        ``noise_level``, which is that of single readings, stays.
+        """
         axes, powers, log_det = self.axes
-        level = self.noise_level
-        made = replace(
-            self,
-            noise=scale**2 * self.noise,
-            tied=scale * self.tied,
-            noise_level=replace(level, white=scale * level.white, correlated=scale * level.correlated),
-        )
+        made = replace(self, noise=scale**2 * self.noise, tied=scale * self.tied)
         made.__dict__.update({name: getattr(self, name) for name in ("model", "lean", "bow")})
         made.__dict__["axes"] = (
             axes / scale,

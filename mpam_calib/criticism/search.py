@@ -19,6 +19,8 @@ from scipy import linalg
 
 from mpam_calib.criticism.doubt import DOUBTS
 from mpam_calib.criticism.fit import Fit, fit
+from mpam_calib.criticism.forms import flexible, forms_of, price
+from mpam_calib.criticism.noise_scale import noise_scale
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
 from mpam_calib.criticism.spread import Alone, Spread, held_problem, spread_over
 from mpam_calib.model.bend import is_bend
@@ -31,9 +33,6 @@ Try = tuple[tuple[str, ...], dict[str, float]]
 
 RATE = 0.001
 """Prior odds of one more cause: a passenger must not come close to the set that it rides on."""
-FORM_SHARES = (0.5, 0.4, 0.1)
-"""Prior shares of an effect's forms: its equation as it is written, other equations for it, bent ones. A
-rival that must bend in all its parts is not to come close to causes that follow an equation."""
 WIDTH = 6
 """Sets of each size that are extended further."""
 LEADING_SHARE = 3
@@ -41,6 +40,8 @@ LEADING_SHARE = 3
 PARTNERS = 8
 """Best single effects that are tried as partners of every kept set."""
 LARGEST = 3
+CARRIED = 40
+"""Leading sets that go on once the noise is settled."""
 LEADERS = 5
 """Sets whose parts and forms are looked at once more."""
 DOUBTED, DOUBTED_EACH = 12, 4
@@ -62,6 +63,8 @@ class Search:
     """Whether a fit also doubts the forms of its effects: only the leading sets are worth that."""
     searched: dict[tuple[Set, int], Fit] = field(default_factory=dict)
     """All that was refitted before the doubt."""
+    seen: frozenset[Set] = frozenset()
+    """Sets that were refitted before the noise was settled."""
 
     def refit(self, effects: Set, size: int) -> Fit:
         """The best exact refit of a set, from where its best parts ended and from nothing.
@@ -172,6 +175,19 @@ class Search:
         self.searched, self.fits = self.fits, dict(zip(keys, doubted, strict=True))
         self.doubting = True
 
+    def on(self, problem: Problem, spread: Spread) -> Search:
+        """The leading sets refitted to the same rows with another noise, each from where it ended."""
+        kept = {frozenset(), *self.sets[:CARRIED]}
+        kept |= {s for k in range(1, LARGEST + 1) for s in _keep(self, k, WIDTH)}
+        made = Search(problem, self.tested, spread, seen=self.seen | {effects for effects, _ in self.fits})
+        keys = [key for key in self.fits if key[0] in kept]
+        fits = (self.fits[key] for key in keys)
+        tasks = [(f.size, [(tuple(sorted(f.effects)), _ended(f))], False) for f in fits]
+        for key, found in zip(keys, spread(_best_of, tasks, chunk=4), strict=True):
+            if found is not None:
+                made.fits[key] = found
+        return made
+
     def log_prior(self, effects: Set) -> float:
         """Log prior of a set (up to a constant)."""
         n, k = len(self.tested), len(effects)
@@ -218,52 +234,72 @@ def search(
     listener: Callable[[float], None] | None = None,
     width: int = WIDTH,
     workers: int = 1,
+    settle: bool = True,
 ) -> Search:
     """Search sets of up to three effects, the remainder always in play.
 
     Singles are refitted for every size of the remainder; kept sets are extended by the most promising
-    partners, refitted exactly, and pruned again. ``listener`` is told the share that is done.
+    partners, refitted exactly, and pruned again. Then the best set says how large the noise is, unless that
+    is not to ``settle`` any more, and the leading sets are refitted. ``listener`` is told the share done.
     """
     tell = listener or (lambda share: None)
-    every = range(len(SIZES))
     with spread_over(problem, workers) as spread:
         found = Search(problem, tested, spread)
-        singles = [frozenset([identifier]) for identifier in tested]
-        for size in every:  # beside one remainder after the other: a fit starts where its neighbour ended
-            found.refit_all((s, size) for s in [frozenset(), *singles])
-            tell(0.05 * (size + 1))
-        kept = _keep(found, 1, width)
-        _polish(found, kept)
-        best = [next(iter(s)) for s in _keep(found, 1, PARTNERS)]
-        for k in range(2, LARGEST + 1):
-            if k == 2 and width >= WIDTH:
-                # Small causes show only beside each other: all pairs are worth a look.
-                found.refit_all((frozenset(pair), 0) for pair in combinations(tested, 2))
-            tell(0.2 if k == 2 else 0.65)
-            tries = {s | {p} for s in kept for p in _partners(found, s, best) if p not in s}
-            # A straight line along what a cause does alone may miss what it does beside others.
-            tries |= {s | {p} for s in kept[: width // LEADING_SHARE] for p in tested if p not in s}
-            for size in (0, 1):
-                found.refit_all((effects, size) for effects in sorted(tries, key=sorted))
-            tell(0.4 if k == 2 else 0.8)
-            kept = _keep(found, k, width)
-            for size in every:
-                found.refit_all((effects, size) for effects in kept)
-            _polish(found, kept)
-        for turn in range(2):
-            tell(0.9 + 0.05 * turn)
-            # One cause of the best set may stand in for another that no kept set led to.
-            first = found.sets[0]
-            found.refit_all((first - {e} | {p}, 0) for e in sorted(first) for p in tested if p not in first)
-            # A leader's own parts must have been looked at, or it could hide a passenger.
-            leaders = found.sets[:LEADERS]
-            parts = [frozenset(p) for s in leaders for p in combinations(sorted(s), max(len(s) - 1, 0))]
-            for size in every:
-                found.refit_all((effects, size) for effects in [*parts, *leaders])
-            _polish(found, [*parts, *leaders])
-        found.doubt()
-    found.spread = Alone(problem)
+        _grow(found, width, tell)
+        if not settle:
+            _finish(found, tell)
+    if settle:
+        best = found.sets[0]
+        fits = [f for (effects, _), f in found.fits.items() if effects == best]
+        settled = problem.with_noise_scale(noise_scale(problem, fits))
+        with spread_over(settled, workers) as spread:
+            found = found.on(settled, spread)
+            _finish(found, tell)
+    found.spread = Alone(found.problem)
     return found
+
+
+def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
+    """Singles, and kept sets extended by one effect after the other."""
+    tested, every = found.tested, range(len(SIZES))
+    singles = [frozenset([identifier]) for identifier in tested]
+    for size in every:  # beside one remainder after the other: a fit starts where its neighbour ended
+        found.refit_all((s, size) for s in [frozenset(), *singles])
+        tell(0.05 * (size + 1))
+    kept = _keep(found, 1, width)
+    _polish(found, kept)
+    best = [next(iter(s)) for s in _keep(found, 1, PARTNERS)]
+    for k in range(2, LARGEST + 1):
+        if k == 2 and width >= WIDTH:
+            # Small causes show only beside each other: all pairs are worth a look.
+            found.refit_all((frozenset(pair), 0) for pair in combinations(tested, 2))
+        tell(0.2 if k == 2 else 0.6)
+        tries = {s | {p} for s in kept for p in _partners(found, s, best) if p not in s}
+        # A straight line along what a cause does alone may miss what it does beside others.
+        tries |= {s | {p} for s in kept[: width // LEADING_SHARE] for p in tested if p not in s}
+        for size in (0, 1):
+            found.refit_all((effects, size) for effects in sorted(tries, key=sorted))
+        tell(0.4 if k == 2 else 0.75)
+        kept = _keep(found, k, width)
+        for size in every:
+            found.refit_all((effects, size) for effects in kept)
+        _polish(found, kept)
+
+
+def _finish(found: Search, tell: Callable[[float], None]) -> None:
+    """The leaders' neighbours and parts, and a doubt about the forms of all that lead."""
+    for turn in range(2):
+        tell(0.85 + 0.07 * turn)
+        # One cause of the best set may stand in for another that no kept set led to.
+        first = found.sets[0]
+        found.refit_all((first - {e} | {p}, 0) for e in sorted(first) for p in found.tested if p not in first)
+        # A leader's own parts must have been looked at, or it could hide a passenger.
+        leaders = found.sets[:LEADERS]
+        parts = [frozenset(p) for s in leaders for p in combinations(sorted(s), max(len(s) - 1, 0))]
+        for size in range(len(SIZES)):
+            found.refit_all((effects, size) for effects in [*parts, *leaders])
+        _polish(found, [*parts, *leaders])
+    found.doubt()
 
 
 def _best_of(task: tuple[int, list[Try], bool]) -> Fit | None:
@@ -305,33 +341,13 @@ def _better(
             found = fit(held_problem(), frozenset(forms), size, start, doubts=doubts)
     except np.linalg.LinAlgError:
         return best
-    found = replace(found, log_evidence=found.log_evidence - sum(map(_price, forms)))
+    found = replace(found, log_evidence=found.log_evidence - sum(map(price, forms)))
     return found if best is None or found.log_evidence > best.log_evidence else best
-
-
-def _price(form: str) -> float:
-    """Nats that one form costs: its share of the prior among the effect's forms."""
-    identifier, _, name = form.partition(":")
-    item = effect(identifier)
-    counts = (1, len(item.forms), len(item.bent_forms))
-    kind = 2 if name in item.bent_forms else 1 if name else 0
-    total = sum(share for share, count in zip(FORM_SHARES, counts, strict=True) if count)
-    return log(total * counts[kind] / FORM_SHARES[kind])
 
 
 def _polish(found: Search, sets: Iterable[Set]) -> None:
     listed = [s for s in sets if any((s, size) in found.fits for size in range(len(SIZES)))]
     found.polish_all((s, size) for s in listed for size in (0, found.best_size(s)))
-
-
-def flexible(identifier: str) -> tuple[str, ...]:
-    """The forms that hold most shapes of an effect, one of every kind."""
-    return tuple(f"{identifier}:{form}" for form in effect(identifier).bent_forms) or (identifier,)
-
-
-def forms_of(identifier: str) -> tuple[str, ...]:
-    """The effect's id as it is, and with each of its other forms."""
-    return (identifier, *(f"{identifier}:{form}" for form in effect(identifier).all_forms))
 
 
 def _own_names(problem: Problem, effects: Set) -> list[str]:

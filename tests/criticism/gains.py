@@ -79,7 +79,7 @@ def measure(recipe: recipes.Recipe) -> list[str] | None:
     for size in range(len(SIZES)):
         found.refit(verdict.standing, size)
     named = found.fits[verdict.standing, found.best_size(verdict.standing)]
-    gain = measure_gain(problem, tested, named)
+    gain = measure_gain(found.problem, tested, named)
     if gain is None:
         return None
     by_cycle = gain.held_out == "cycle"

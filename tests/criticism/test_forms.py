@@ -20,8 +20,9 @@ from rig.effects import textbook
 from rig.recipes import Recipe, Wanted
 
 from mpam_calib.criticism.fit import fit
+from mpam_calib.criticism.forms import forms_of
 from mpam_calib.criticism.problem import Problem, build_problem
-from mpam_calib.criticism.search import STARTS, forms_of
+from mpam_calib.criticism.search import STARTS
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.effect import effect
 from mpam_calib.specimen import read

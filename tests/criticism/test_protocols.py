@@ -20,8 +20,8 @@ from rig.effects import shared_form
 from rig.recipes import Recipe, Wanted
 
 from mpam_calib.criticism.fit import fit
+from mpam_calib.criticism.forms import forms_of
 from mpam_calib.criticism.problem import Problem, build_problem
-from mpam_calib.criticism.search import forms_of
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.specimen import read
 

@@ -17,8 +17,9 @@ from rig.unusual import Unusual
 
 from mpam_calib.criticism.candidates import candidates
 from mpam_calib.criticism.fit import chain_for, fit
+from mpam_calib.criticism.forms import forms_of
 from mpam_calib.criticism.problem import Problem, build_problem
-from mpam_calib.criticism.search import forms_of, search
+from mpam_calib.criticism.search import search
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.specimen import read
