@@ -47,7 +47,10 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
         *("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),
         *("power", "force-power", "test-power", "test-force-power", "virgin"),
     ),
-    "creep": ("bent", "wall", "wall-bent", "power", "solid", "wall-power", "wall-solid"),
+    "creep": (
+        *("bent", "wall", "wall-bent", "early", "power", "solid"),
+        *("wall-early", "wall-power", "wall-solid"),
+    ),
     "force_drift": (
         *("bent", "settling", "settling-bent", "tared", "tared-bent"),
         *("power", "thermal", "return"),

@@ -118,7 +118,7 @@ def test_a_form_says_what_it_is_and_may_be_declared(form: str) -> None:
     assert item.source == base.sources[name]
     shared, all_names = ([p.name for p in i.parameters(setting)] for i in (base, item))
     own = base.own[name](setting) if name in base.own else ()
-    assert len(own) <= 1
+    assert len(own) <= 2
     assert all_names == [*shared[: base.leading.get(name)], *(p.name for p in own)]
     for parameter in own:
         assert (parameter.unit == "") == (unit_of(parameter.name) == "")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.curves import box_cox, settled
-from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.effect import Effect, Parameters, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
@@ -27,41 +27,49 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     )
 
 
-def _apply(state: State, values: Values, setting: Setting) -> State:
-    decades = np.log10(1.0 + state.readings.time_at_level / ONSET)
-    return replace(state, gain=state.gain * (1.0 - values["creep_per_decade"] * decades))
-
-
-def _wall(state: State, values: Values, setting: Setting) -> State:
-    """The bladder's stress relaxes; the gas and the braid do not."""
-    decades = np.log10(1.0 + state.readings.time_at_level / ONSET)
-    return replace(state, wall_gain=state.wall_gain * (1.0 - values["creep_per_decade"] * decades))
-
-
 def _middle(setting: Setting) -> float:
     """Half the longest time at a level, s: there all equations agree."""
     return max(0.5 * setting.level_time, ONSET)
 
 
+def _log(state: State, values: Values, setting: Setting) -> Array:
+    """Decades from a level's first reading on."""
+    return np.log10(1.0 + state.readings.time_at_level / ONSET)
+
+
+def _since(state: State, values: Values) -> Array:
+    """Time since the level was reached, some of it before the first reading, s."""
+    return state.readings.time_at_level + values["creep_before_s"]
+
+
+def _before(setting: Setting) -> Parameter:
+    return Parameter("creep_before_s", LogNormal(2.0, 1.0), "time at the level before its first reading")
+
+
+def _early(state: State, values: Values, setting: Setting) -> Array:
+    """Decades since the level was reached: some are over when the first reading is taken."""
+    return np.asarray(np.log10(1.0 + _since(state, values) / ONSET))
+
+
 def _power(state: State, values: Values, setting: Setting) -> Array:
-    """Decades along a power of time instead of its logarithm; below 0 it comes to an end."""
+    """Decades along a power of that time instead of its logarithm; below 0 it comes to an end."""
     middle, exponent = 1.0 + _middle(setting) / ONSET, values["creep_exponent"]
-    part = box_cox(1.0 + state.readings.time_at_level / ONSET, exponent) / box_cox(np.array(middle), exponent)
+    part = box_cox(1.0 + _since(state, values) / ONSET, exponent) / box_cox(np.array(middle), exponent)
     return np.asarray(np.log10(middle) * part)
 
 
-def _exponent(setting: Setting) -> tuple[Parameter, ...]:
-    return (Parameter("creep_exponent", Normal(0.0, 0.3), "power of time", "textbook", ""),)
+def _exponent(setting: Setting) -> Parameter:
+    return Parameter("creep_exponent", Normal(0.0, 0.3), "power of time", "textbook", "")
 
 
 def _solid(state: State, values: Values, setting: Setting) -> Array:
     """Decades along an exponential with one time constant: a spring beside a spring and a dashpot."""
-    part = settled(state.readings.time_at_level, values["relaxation_s"], _middle(setting))
+    part = settled(_since(state, values), values["relaxation_s"], _middle(setting))
     return np.asarray(np.log10(1.0 + _middle(setting) / ONSET) * part)
 
 
-def _time(setting: Setting) -> tuple[Parameter, ...]:
-    return (Parameter("relaxation_s", LogNormal(0.4 * _middle(setting), 1.0), "time of relaxation"),)
+def _time(setting: Setting) -> Parameter:
+    return Parameter("relaxation_s", LogNormal(0.4 * _middle(setting), 1.0), "time of relaxation")
 
 
 def _whole(decades: Decades) -> Apply:
@@ -84,6 +92,19 @@ def _bladder(decades: Decades) -> Apply:
     return apply
 
 
+DECADES = {"early": _early, "power": _power, "solid": _solid}
+OWN: dict[str, Parameters] = {
+    "early": lambda setting: (_before(setting),),
+    "power": lambda setting: (_exponent(setting), _before(setting)),
+    "solid": lambda setting: (_time(setting), _before(setting)),
+}
+SOURCES = {
+    "early": "the same logarithm, counted from before the first reading",
+    "power": "power law of relaxation (Nutting 1921; Findley 1944)",
+    "solid": "standard linear solid (Zener 1948): 1 − exp(−t/τ)",
+}
+"""Equations for the relaxation, of the whole force or of the bladder alone."""
+
 register(
     Effect(
         id="creep",
@@ -93,17 +114,14 @@ register(
         told_by="a hold of ten minutes at one pressure and length",
         source="logarithmic relaxation: F(1 − creep·log10(1 + t/1 s))",
         parameters=_parameters,
-        apply=_apply,
+        apply=_whole(_log),
         forms={
-            "wall": _wall,
-            "power": _whole(_power),
-            "solid": _whole(_solid),
-            "wall-power": _bladder(_power),
-            "wall-solid": _bladder(_solid),
+            "wall": _bladder(_log),
+            **{form: _whole(decades) for form, decades in DECADES.items()},
+            **{f"wall-{form}": _bladder(decades) for form, decades in DECADES.items()},
         },
-        own={"power": _exponent, "solid": _time, "wall-power": _exponent, "wall-solid": _time},
-        sources=dict.fromkeys(("power", "wall-power"), "power law of relaxation (Nutting 1921; Findley 1944)")
-        | dict.fromkeys(("solid", "wall-solid"), "standard linear solid (Zener 1948): 1 − exp(−t/τ)"),
+        own={f"{kind}{form}": own for kind in ("", "wall-") for form, own in OWN.items()},
+        sources={f"{kind}{form}": source for kind in ("", "wall-") for form, source in SOURCES.items()},
         kinds={"wall": "here the bladder's alone"},
         bends={"level_time": 4},
         looseness=1.5,
