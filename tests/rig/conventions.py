@@ -70,6 +70,18 @@ def _sliding_at_first(state: State, size: float) -> None:
     state.turn = state.turn * np.where(rows.travel <= rows.since_reversal * (1.0 + 1e-9), 1.0, turning)
 
 
+def _begun_before(state: State, size: float) -> None:
+    """By a power of the time since the level was reached, 2.5 s before its first reading."""
+    decades = ((1.0 + (state.rows.level_time + 2.5) / 0.8) ** 0.2 - 1.0) / (0.2 * np.log(10.0))
+    state.history.append(lambda force: force * (1.0 - size * decades))
+
+
+def _raised(state: State, size: float) -> None:
+    """What a tensile test says holds without pressure; under it the moduli rise (or fall) and level off."""
+    top = float(state.rows.setpoint.max())
+    state.bends.append(lambda p: np.maximum(1.0 + size * -np.expm1(-2.0 * np.maximum(p, 0.0) / top), 0.02))
+
+
 def _by(name: str, effect: str, apply: Callable[[State, float], None]) -> Form:
     return replace(shared_form(effect), name=name, apply=apply, shared=False)
 
@@ -86,6 +98,10 @@ CONVENTIONS: dict[str, Form] = {
         _by("first_stretching", "stress_softening", _stiffer(_first_stretching)),
         # No reversal begins a level's first stroke: friction does not turn over on it.
         _by("sliding_at_first", "presliding", _sliding_at_first),
+        # A level is reached some time before its first reading.
+        _by("begun_before", "creep", _begun_before),
+        # Pressure changes the moduli's mean as well.
+        _by("raised", "law_shape", _raised),
         # Full stroke is each level's own.
         _by("own_stroke", "pressure_droop", _drooping(lambda rows: rows.level_fraction)),
         # A regulator that does not keep up: in proportion to the speed as well.
