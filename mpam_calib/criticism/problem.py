@@ -51,7 +51,7 @@ FORCE_MAP_NOISE = 0.003
 """Noise of a static reading as a share of the force scale, where no sensor sd is declared."""
 
 SANE = 3.0
-"""Prior sds beyond which moduli are not believed to bend as they say."""
+"""Prior sds beyond which known moduli are not believed to bend as they say."""
 INHERITED = ("model", "lean", "bow", "root", "axes", "spreads", "log_dets")
 """What other forces do not change, or hardly."""
 
@@ -157,8 +157,9 @@ class Problem:
         X = columns / self.noise_level.total
         residual = (np.tile(self.force, 3) - fixed) / self.noise_level.total
         eta = linalg.solve(X.T @ X + np.eye(X.shape[1]), X.T @ residual) if X.shape[1] else np.zeros(0)
-        # Moduli far out of their prior stand in for something that is bent elsewhere.
-        eta = eta * min(1.0, SANE / max(float(np.abs(eta).max(initial=0.0)), SANE))
+        if self.model.blueprint.simulation.moduli != "loops":
+            # Known moduli far out of their prior stand in for something that is bent elsewhere.
+            eta = eta * min(1.0, SANE / max(float(np.abs(eta).max(initial=0.0)), SANE))
         low, high, middle = (fixed + columns @ eta).reshape(3, n)
         return np.asarray(0.5 * (low + high) - middle)
 
