@@ -239,6 +239,19 @@ def test_a_law_at_its_natural_size_is_its_lowest_bend() -> None:
     np.testing.assert_allclose(gains[0], gains[1], rtol=1e-12)
 
 
+@pytest.mark.parametrize("form", ["law_shape", "law_shape:exponential"])
+def test_moduli_of_a_tensile_test_may_be_higher_on_average_under_pressure(form: str) -> None:
+    setting = setting_for(form, "constant")
+    tensile = setting.simulation.model_copy(update={"moduli": "tensile"})
+    known = replace(setting, simulation=tensile)
+    free, names = ([p.name for p in effect(form).parameters(s)] for s in (setting, known))
+    assert "law_bend_0" not in free  # free moduli have their mean themselves
+    assert set(names) == {*free, "law_bend_0"}
+    values = {name: np.zeros((1, 1)) for name in names} | {"law_bend_0": np.array([[0.4]])}
+    gain = effect(form).apply(start(known, rows(known)), values, known).wall_gain
+    np.testing.assert_allclose(gain, 1.4)
+
+
 def test_growth_by_a_power_passes_through_the_logarithm() -> None:
     ratio = np.array([0.1, 0.5, 1.0, 3.0, 40.0])
     np.testing.assert_allclose(box_cox(ratio, np.zeros(1)), np.log(ratio))
