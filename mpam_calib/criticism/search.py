@@ -1,6 +1,7 @@
 """Searching sets of effects: linearised scores order the search, exact refits decide it.
 
-In the end the leading sets are refitted with a doubt about their forms (:mod:`mpam_calib.criticism.doubt`).
+Then the best set says how large the noise is (:mod:`mpam_calib.criticism.noise_scale`), and in the end the
+leading sets are refitted with a doubt about their forms (:mod:`mpam_calib.criticism.doubt`).
 A set's posterior sums its evidence over the remainder's sizes. A priori a further cause is as likely
 as the average catalogue has it: a set of k out of n effects has prior ∝ RATE^k / C(n, k).
 """
