@@ -252,7 +252,8 @@ def search(
     if settle:
         best = found.sets[0]
         fits = [f for (effects, _), f in found.fits.items() if effects == best]
-        settled = problem.with_noise_scale(noise_scale(problem, fits))
+        # Never up: what is left beyond the noise may be a cause that the best set still lacks, or has no name.
+        settled = problem.with_noise_scale(min(noise_scale(problem, fits), 1.0))
         with spread_over(settled, workers) as spread:
             found = found.on(settled, spread)
             _finish(found, tell)
