@@ -1,6 +1,6 @@
 """Searching sets of effects: linearised scores order the search, exact refits decide it.
 
-Then the best set says how large the noise is (:mod:`mpam_calib.criticism.noise_scale`), and in the end the
+Then the best set says how small the noise is (:mod:`mpam_calib.criticism.noise_scale`), and in the end the
 leading sets are refitted with a doubt about their forms (:mod:`mpam_calib.criticism.doubt`).
 A set's posterior sums its evidence over the remainder's sizes. A priori a further cause is as likely
 as the average catalogue has it: a set of k out of n effects has prior ∝ RATE^k / C(n, k).
@@ -240,7 +240,7 @@ def search(
     """Search sets of up to three effects, the remainder always in play.
 
     Singles are refitted for every size of the remainder; kept sets are extended by the most promising
-    partners, refitted exactly, and pruned again. Then the best set says how large the noise is, unless that
+    partners, refitted exactly, and pruned again. Then the best set says how small the noise is, unless that
     is not to ``settle`` any more, and the leading sets are refitted. ``listener`` is told the share done.
     """
     tell = listener or (lambda share: None)
@@ -252,7 +252,7 @@ def search(
     if settle:
         best = found.sets[0]
         fits = [f for (effects, _), f in found.fits.items() if effects == best]
-        # Never up: what is left beyond the noise may be a cause that the best set still lacks, or has no name.
+        # Never up: what is left beyond the noise may be a cause that the best set still lacks.
         settled = problem.with_noise_scale(min(noise_scale(problem, fits), 1.0))
         with spread_over(settled, workers) as spread:
             found = found.on(settled, spread)
