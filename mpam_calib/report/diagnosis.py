@@ -43,6 +43,8 @@ SENTENCES = {
     "unexplained": "The declared simulation is wrong in a way that no known set of causes removes.",
 }
 
+NO_SIZE = {"mean": np.nan, "q05": np.nan, "q95": np.nan}
+
 FORMS = (
     "These probabilities suppose that a rig's effects follow the catalogue's equations, bent ones too, "
     "to a few per cent. On hidden test cases sets stated at more than 0.99 were the true ones in four of "
@@ -176,8 +178,8 @@ def _causes(causes: list[dict[str, Any]]) -> list[Block]:
         return [Text("None is named.")]
     rows = [
         {
-            "cause": effect(c["id"]).title,
-            "what it means": _meaning(c["id"], c["form"]),
+            "cause": "" if number else effect(c["id"]).title,
+            "what it means": "" if number else _meaning(c["id"], c["form"]),
             "probability": probability(c["probability"]),
             "parameter": name,
             "mean": values["mean"],
@@ -187,7 +189,7 @@ def _causes(causes: list[dict[str, Any]]) -> list[Block]:
             "share of misfit": c["share_of_misfit"],
         }
         for c in causes
-        for name, values in (c["parameters"] or {"": {"mean": np.nan, "q05": np.nan, "q95": np.nan}}).items()
+        for number, (name, values) in enumerate((c["parameters"] or {"": NO_SIZE}).items())
     ]
     formats = dict.fromkeys(["mean", "5 %", "95 %", "share of misfit"], "{:.3g}") | {"probability": "{}"}
     return [Text(FORMS), DataTable(pd.DataFrame(rows), "Causes with their sizes (90 % bands)", formats)]
