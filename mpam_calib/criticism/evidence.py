@@ -153,9 +153,10 @@ def _sizes(
         if terms[size] < best - NEGLIGIBLE:
             break
         integral = _integral(*modes[size], rates.get(size)) if many else rule(*modes[size])
-        if many or integral.reliable:
-            terms[size] = integral.value + log(SIZE_PRIOR[size])
-            inner[size] = modes[size][0], integral
+        if not many and not integral.reliable:
+            integral = anneal(*modes[size])
+        terms[size] = integral.value + log(SIZE_PRIOR[size])
+        inner[size] = modes[size][0], integral
         best = max(best, terms[size])
     return terms, inner
 

@@ -204,8 +204,8 @@ def test_laplace_near_the_top_is_the_quadrature(name: str, monkeypatch: pytest.M
             continue
         hypothesis = Hypothesis(problem, ranking.blueprint_of(problem, r.simulation), r.best)
         mode = hypothesis.mode()
-        if _inside(hypothesis, mode) >= 4.0:
-            exact = _dense(hypothesis, mode) if len(mode.u) <= 2 else integrate(hypothesis, mode).value
+        if inside(hypothesis, mode) >= 4.0:
+            exact = dense(hypothesis, mode) if len(mode.u) <= 2 else integrate(hypothesis, mode).value
             off.append((mode.log_evidence - exact, expand(hypothesis, mode).value - exact))
     assert len(off) >= 5
     first, second = np.abs(off).T
@@ -213,7 +213,7 @@ def test_laplace_near_the_top_is_the_quadrature(name: str, monkeypatch: pytest.M
     assert np.sqrt(np.mean(second**2)) < np.sqrt(np.mean(first**2))
 
 
-def _dense(hypothesis: Hypothesis, mode: Mode) -> float:
+def dense(hypothesis: Hypothesis, mode: Mode) -> float:
     """Log evidence of one or two parameters on a grid of a fifth of a standard deviation."""
     line, d = np.linspace(-8.0, 8.0, 81), len(mode.u)
     root = np.linalg.cholesky(mode.covariance)
@@ -222,7 +222,7 @@ def _dense(hypothesis: Hypothesis, mode: Mode) -> float:
     return float(special.logsumexp(log_p) + d * np.log(line[1] - line[0]) + np.linalg.slogdet(root)[1])
 
 
-def _inside(hypothesis: Hypothesis, mode: Mode) -> float:
+def inside(hypothesis: Hypothesis, mode: Mode) -> float:
     """How many sds the size nearest to its bound at 0 lies above it."""
     away = [np.inf]
     for i, parameter in enumerate(hypothesis.parameters):
