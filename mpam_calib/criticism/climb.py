@@ -16,6 +16,7 @@ from scipy.linalg import lapack
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.bend import is_bend
 from mpam_calib.model.chain import Chain, Unsigned
+from mpam_calib.model.priors import LongTailed
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,9 @@ NUDGE = 1e-4
 SETTLED = 0.02
 """Share of a reading's noise to which a force that depends on itself must have settled."""
 FURTHEST, MOST_BENT = 7.0, 2.5
-"""Largest coordinate (prior sds) of a size, and of a bend."""
+"""Largest coordinate (prior sds) of a size, and of a bend ..."""
+FURTHEST_OUT = 12.0
+"""... and of a size with a long tail: thirty-four of its scales."""
 REACH = 1.5
 """Longest step of a coordinate, prior sds."""
 SIGN_ROUNDS = 3
@@ -212,7 +215,8 @@ class Climb:
     ) -> Place:
         d = len(u)
         bends = np.array([is_bend(name) for name in self.names], dtype=bool)
-        furthest = np.where(bends, MOST_BENT, FURTHEST)
+        tailed = np.array([isinstance(p.prior, LongTailed) for p in self.chain.parameters], dtype=bool)
+        furthest = np.where(bends, MOST_BENT, np.where(tailed, FURTHEST_OUT, FURTHEST))
         released = not bends.any() or bool(np.any(u[bends] != 0.0))
         best: Place | None = None
         J = np.empty((0, 0))

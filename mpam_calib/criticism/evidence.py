@@ -25,6 +25,7 @@ from mpam_calib.posterior.bridge import Bridge, bridge_evidence
 from mpam_calib.posterior.evidence import Evidence, integrate
 from mpam_calib.posterior.expansion import expand
 from mpam_calib.posterior.mode import Density, Mode
+from mpam_calib.posterior.refitted import integrate_refitted
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,8 @@ NEGLIGIBLE, NEGLIGIBLE_ELSEWHERE = 5.0, 8.0
 SETTLES = 7
 """Parameters up to which the rule of quadrature settles; with more a crowd of points is annealed, and rates
 of each modulus's own are integrated alone."""
+FEW = 4
+"""Parameters up to which densities fitted to the points follow every bend."""
 OWN_RATES = "exponential_each"
 AS_DECLARED = (1.0, 1.0)
 WIDTHS = {
@@ -154,7 +157,7 @@ def _sizes(
             break
         integral = _integral(*modes[size], rates.get(size)) if many else rule(*modes[size])
         if not many and not integral.reliable:
-            integral = anneal(*modes[size])
+            integral = integrate_refitted(*modes[size])
         terms[size] = integral.value + log(SIZE_PRIOR[size])
         inner[size] = modes[size][0], integral
         best = max(best, terms[size])
@@ -162,11 +165,11 @@ def _sizes(
 
 
 def _expanded(density: Density, mode: Mode) -> Evidence:
-    """The evidence of a few parameters: quadrature only where a bound is near or the density is bent."""
+    """The evidence of a few parameters: points only where a bound is near or the density is bent."""
     expansion = expand(density, mode)
     if expansion.tame:
         return Evidence(expansion.value, expansion.error, mode.u, mode.covariance)
-    return integrate(density, mode)
+    return integrate_refitted(density, mode) if 1 < len(mode.u) <= FEW else integrate(density, mode)
 
 
 def _integral(hypothesis: Hypothesis, mode: Mode, rates: Rates | None) -> Evidence:

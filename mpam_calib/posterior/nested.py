@@ -70,7 +70,7 @@ def weigh_nested(density: Density, mode: Mode, seed: int) -> Weighted:
     while True:
         shares = np.concatenate([qmc.Sobol(len(mode.u) + 2, rng=rng).random(POINTS) for _ in range(SHIFTS)])
         shares = np.clip(shares, BEYOND, 1.0 - BEYOND)
-        new = _place(drawn[-1], shares[:, : len(nested.wide) + 2])
+        new = place(drawn[-1], shares[:, : len(nested.wide) + 2])
         found = nested.follow(new, z, known)
         u, weight = nested.draw(new, found, shares[:, len(nested.wide) + 2 :])
         z, marginal = np.concatenate([z, new]), np.concatenate([marginal, found.log_marginal])
@@ -212,8 +212,8 @@ def _fitted(z: Array, weight: Array) -> StudentMixture:
     return StudentMixture.build(means, [INFLATION**2 * c for c in covariances], shares)
 
 
-def _place(mixture: StudentMixture, shares: Array) -> Array:
-    """Points (n, w) of the mixture at shares (n, 2 + w): of its components, of their widths, along axes."""
+def place(mixture: StudentMixture, shares: Array) -> Array:
+    """Points (n, w) of a mixture at shares (n, 2 + w): of its components, of their widths, along axes."""
     which = np.searchsorted(np.cumsum(mixture.shares)[:-1], shares[:, 0])
     freedom = np.broadcast_to(mixture.freedom, mixture.shares.shape)[which]
     wide = np.sqrt(freedom / stats.chi2.ppf(shares[:, 1], freedom))

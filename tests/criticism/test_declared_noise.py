@@ -11,7 +11,8 @@ from prediction.coverage import as_specimen, rig_case
 from rig.chain import force_of
 
 from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.noise_level import noise_level, noise_windows
+from mpam_calib.criticism.noise_level import noise_level
+from mpam_calib.criticism.noise_windows import inside_strokes
 from mpam_calib.criticism.problem import Problem, build_problem
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.noise import CORRELATED, TIME, WHITE
@@ -97,7 +98,7 @@ def test_the_search_reaches_the_noise(name: str) -> None:
     specimen = read(DATASETS / name)
     assert specimen.loops is not None
     model = build_problem_of(specimen).model
-    found, windows = noise_level(specimen.loops, model), noise_windows(specimen.loops)
+    found, windows = noise_level(specimen.loops, model), inside_strokes(specimen.loops)
     assert found is not None
     assert windows is not None
     usual, priors = windows.usual(grows=False), {p.name: p.prior for p in model.parameters}

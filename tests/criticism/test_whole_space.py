@@ -11,11 +11,12 @@ import pytest
 from criticism.test_evidence import dense, inside
 from criticism.test_hypotheses import problem_of
 from mpam_calib.criticism import ranking, space
-from mpam_calib.criticism.evidence import NEGLIGIBLE, SETTLES, log_evidence_beyond_laplace
+from mpam_calib.criticism.evidence import FEW, NEGLIGIBLE, SETTLES, log_evidence_beyond_laplace
 from mpam_calib.criticism.hypothesis import Hypothesis
 from mpam_calib.criticism.problem import SIZE_PRIOR, Problem
 from mpam_calib.criticism.ranking import Ranked
 from mpam_calib.posterior.evidence import integrate
+from mpam_calib.posterior.refitted import integrate_refitted
 from mpam_calib.specimen import read
 
 DATASETS = Path(__file__).parents[2] / "datasets"
@@ -68,7 +69,8 @@ def _off(problem: Problem, ranked: Ranked) -> list[tuple[float, float, float, fl
         if len(mode.u) <= 2:
             exact = dense(hypothesis, mode)
         else:
-            exact, known = integrate(hypothesis, mode, seed=1)[:2]
+            rule = integrate_refitted if len(mode.u) <= FEW else integrate
+            exact, known = rule(hypothesis, mode, seed=1)[:2]
         value, error = log_evidence_beyond_laplace(problem, blueprint, [found])
         value -= float(np.log(SIZE_PRIOR[found.size]))
         error = float(np.hypot(np.nan_to_num(error), known))

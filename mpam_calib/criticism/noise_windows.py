@@ -1,0 +1,138 @@
+"""Pieces of strokes in which only the noise is left: the muscle's own curve is taken out of them.
+
+Of consecutive rows inside a stroke a polynomial is taken out; of two strokes that repeat each other the
+difference is what the muscle did not do twice. The first are many and short, and see little of a noise that
+is correlated for longer than a few of their rows; the second see that.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.posterior.sites import usual_chunks
+from mpam_calib.specimen.recording import Loops
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+WINDOW, LONG_WINDOW, DEGREE = 32, 48, 3
+"""Windows of at most so many rows, of one stroke or of two, detrended by a polynomial of this degree ..."""
+SHORT_DEGREE = 5
+"""... or of this one, where a stroke is so short that it is one window."""
+USUAL = 4.0
+"""Multiple of the typical power above which a window holds more than noise."""
+FEWEST_PAIRS = 6
+"""Pairs of repeated strokes that are enough to tell the noise from."""
+ALIKE = 20
+"""Strokes repeat each other where their numbers of rows differ by a row, or by one in so many."""
+
+
+class Windows(NamedTuple):
+    """What the contrasts of windows see (k, dof), the windows' mean forces (k,), contrasts, time step (s)."""
+
+    chunks: Array
+    force: Array
+    contrast: Array
+    dt: float
+
+    def usual(self, grows: bool) -> Windows:
+        """Without bursts and snaps, which must not pass for noise.
+
+        They are far above the typical window, or above those of similar force where noise grows with it.
+        """
+        if grows:
+            kept = usual_chunks(self.chunks, self.force)
+            return self._replace(chunks=self.chunks[kept], force=self.force[kept])
+        power = np.mean(self.chunks**2, axis=1)
+        kept = power <= USUAL * np.median(power)
+        return self._replace(chunks=self.chunks[kept], force=self.force[kept])
+
+    @property
+    def scatter(self) -> tuple[Array, int, Array, float]:
+        """As the likelihood of fast noise takes it."""
+        return self.chunks.T @ self.chunks, len(self.chunks), self.contrast, self.dt
+
+
+def inside_strokes(loops: Loops, degree: int = DEGREE) -> Windows | None:
+    """Detrended windows of consecutive rows inside strokes, away from their ends; None where there are none.
+
+    Where strokes are too short for any degree, each is one window.
+    """
+    first, length = loops.strokes
+    typical = int(np.median(length))
+    size, margin = min(WINDOW, typical // 4), max(min(WINDOW, typical // 4) // 4, 2)
+    if size < degree + 3 and degree > DEGREE:
+        return None
+    if size < DEGREE + 4:
+        # The whole stroke, with a stiffer curve taken out: differences of far rows see the curve itself.
+        size, degree, margin = min(WINDOW, int(np.quantile(length, 0.25))), SHORT_DEGREE, 0
+    if size < degree + 3:
+        return None
+    starts = [
+        np.arange(f + margin, f + n - margin - size + 1, size)
+        for f, n in zip(first, length, strict=True)
+        if n >= size + 2 * margin
+    ]
+    rows = np.concatenate(starts) if starts else np.empty(0, dtype=np.int64)
+    if len(rows) < 4:
+        return None
+    index = rows[:, None] + np.arange(size)
+    index = index[~loops.censored[index].any(axis=1)]
+    if len(index) < 4:
+        return None
+    dt = float(np.median((loops.time_s[index[:, -1]] - loops.time_s[index[:, 0]]) / (size - 1)))
+    return _detrended(loops.force_N[index], loops.force_N[index].mean(axis=1), degree, dt)
+
+
+def between_strokes(loops: Loops, degree: int = DEGREE) -> Windows | None:
+    """The same from differences of strokes that repeat each other; None where these are few or short.
+
+    What the muscle does, and whatever is wrong with it, comes back in the next cycle; noise does not. A
+    sampling clock that does not keep step with the drive leaves a smooth difference: the polynomial takes it.
+    """
+    first, length = loops.strokes
+    pairs = _repeated(loops)
+    if len(pairs) < FEWEST_PAIRS:
+        return None
+    rows_each = length[pairs].min(axis=1)
+    size = min(LONG_WINDOW, int(np.quantile(rows_each, 0.25)))
+    if size < degree + 4:
+        return None
+    counts = rows_each // size
+    within = np.concatenate([np.arange(n) for n in counts]) * size
+    margins = np.repeat((rows_each - counts * size) // 2, counts)
+    starts = np.repeat(first[pairs], counts, axis=0) + (margins + within)[:, None]
+    rows = starts[:, :, None] + np.arange(size)
+    difference = (loops.force_N[rows[:, 0]] - loops.force_N[rows[:, 1]]) / np.sqrt(2.0)
+    dt = float(np.median((loops.time_s[rows[:, 0, -1]] - loops.time_s[rows[:, 0, 0]]) / (size - 1)))
+    return _detrended(difference, loops.force_N[rows].mean(axis=(1, 2)), degree, dt)
+
+
+def _repeated(loops: Loops) -> Ints:
+    """Pairs (k, 2) of strokes of one level and branch with about as many rows, each stroke in one at most."""
+    first, length = loops.strokes
+    groups: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for stroke, (f, n) in enumerate(zip(first, length, strict=True)):
+        if not loops.censored[f : f + n].any():
+            groups.setdefault((int(loops.level[f]), int(loops.branch[f])), []).append((int(n), stroke))
+    pairs: list[tuple[int, int]] = []
+    for group in groups.values():
+        waiting: tuple[int, int] | None = None
+        for n, stroke in sorted(group):
+            if waiting is not None and n - waiting[0] <= max(1, n // ALIKE):
+                pairs.append((waiting[1], stroke))
+                waiting = None
+            else:
+                waiting = n, stroke
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def _detrended(windows: Array, force: Array, degree: int, dt: float) -> Windows:
+    """Windows (k, size) less a polynomial, with their mean forces (k,)."""
+    size = windows.shape[1]
+    full, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, size), degree + 1), mode="complete")
+    contrast = np.asarray(full[:, degree + 1 :], dtype=np.float64)
+    return Windows(windows @ contrast, force, contrast, max(dt, 1e-9))
