@@ -30,7 +30,7 @@ EFFECT_IDS: Final[tuple[str, ...]] = (
 EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(EFFECT_IDS, ("bent",)),
     "dead_band": ("bent", "soft", "power", "closing"),
-    "tip_shape": ("bent", "working", "power", "round"),
+    "tip_shape": ("bent", "working", "power", "round", "tapered"),
     "braid_kinematics": ("bent", "swell"),
     "braid_angle": ("bent", "seating"),
     "braid_stretch": ("bent", "power"),
@@ -58,7 +58,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "pressure_droop": ("bent", "level", "level-bent", "power", "level-power", "speed"),
     "rig_compliance": ("bent", "power", "toe"),
     "law_shape": ("bent", "exponential"),
-    "order_too_low": ("bent", "fung", "steady"),
+    "order_too_low": ("bent", "fung", "gent", "steady"),
 }
 """Other forms of the effects, declared as ``id:form``."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.curves import middle_pressure
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import LongTailed, Normal, Parameter
+from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.reference import reference_shape, rest_of
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.kinematics import Rest, Shape
@@ -17,28 +18,30 @@ from mpam_calib.physics.statics import axial_lever, hoop_lever, strains
 
 Array = NDArray[np.float64]
 
-STRAIGHT = np.zeros((1, 1))
-"""No hardening."""
+Harder = Callable[[Array], Array]
+"""What a stress is multiplied with at a strain."""
+AT_LIMIT = 0.05
+"""Least that is left of 1 − (e/e_lim)²: no reading is beyond the limit."""
 SHARE = 0.2
 """Prior root mean square of the missing term on the reference grid, as a share of the force scale."""
 
 
-def _next_power(shape: Shape, rest: Rest, setting: Setting, hardening: Array) -> Array:
-    """Force per pascal of E_(M+1), m² (thesis Eq. 4.10), each stress times e^(hardening·strain)."""
+def _next_power(shape: Shape, rest: Rest, setting: Setting, harder: Harder) -> Array:
+    """Force per pascal of E_(M+1), m² (thesis Eq. 4.10), each stress times ``harder`` of its strain."""
     z, x = strains(shape, rest, setting.simulation.strain)
     power = setting.simulation.order + 1
-    axial, hoop = (s**power * np.exp(np.clip(hardening * s, -30.0, 30.0)) for s in (z, x))
+    axial, hoop = (s**power * harder(s) for s in (z, x))
     return axial_lever(shape) * axial - hoop_lever(shape) * hoop
 
 
-def _term(state: State, values: Values, setting: Setting, hardening: Array) -> Array:
+def _term(state: State, values: Values, setting: Setting, harder: Harder = np.ones_like) -> Array:
     """The missing term, N: its root mean square on the grid is ``next_order`` of the force scale."""
     assert state.shape is not None
     grid = reference_shape(setting.geometry, setting.simulation.kinematics)
-    force = _next_power(grid, rest_of(setting.geometry), setting, hardening)
+    force = _next_power(grid, rest_of(setting.geometry), setting, harder)
     unit = setting.force_scale / np.sqrt(np.mean(force**2, axis=-1, keepdims=True))
     size: Array = values["next_order"] * unit
-    return size * _next_power(state.shape, state.rest, setting, hardening)
+    return size * _next_power(state.shape, state.rest, setting, harder)
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -48,7 +51,7 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    return _with_the_law(state, setting, _term(state, values, setting, STRAIGHT))
+    return _with_the_law(state, setting, _term(state, values, setting))
 
 
 def _with_the_law(state: State, setting: Setting, force: Array) -> State:
@@ -60,16 +63,33 @@ def _with_the_law(state: State, setting: Setting, force: Array) -> State:
 
 def _fung(state: State, values: Values, setting: Setting) -> State:
     """The missing term hardens exponentially with the strain; below 0 it softens."""
-    return _with_the_law(state, setting, _term(state, values, setting, values["hardening"]))
+
+    def harder(strain: Array) -> Array:
+        return np.asarray(np.exp(np.clip(values["hardening"] * strain, -30.0, 30.0)))
+
+    return _with_the_law(state, setting, _term(state, values, setting, harder))
 
 
 def _hardening(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("hardening", Normal(0.0, 1.5), "exponent of the strain on top of the power", "", ""),)
 
 
+def _gent(state: State, values: Values, setting: Setting) -> State:
+    """The missing term hardens without bound as the strain nears a limit, from both sides alike."""
+
+    def harder(strain: Array) -> Array:
+        return np.asarray(1.0 / np.maximum(1.0 - (strain / values["limit_strain"]) ** 2, AT_LIMIT))
+
+    return _with_the_law(state, setting, _term(state, values, setting, harder))
+
+
+def _limit(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("limit_strain", LogNormal(2.0, 0.5), "strain that the wall cannot reach", "", ""),)
+
+
 def _steady(state: State, values: Values, setting: Setting) -> State:
     """The missing term is the same at every pressure, whatever the law of the others."""
-    force = _term(state, values, setting, STRAIGHT)
+    force = _term(state, values, setting)
     if setting.simulation.law != "constant":
         force = force * middle_pressure(setting) / setting.top_pressure
     return replace(state, lost=state.lost - force)
@@ -86,10 +106,11 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"fung": _fung, "steady": _steady},
-        own={"fung": _hardening},
+        forms={"fung": _fung, "gent": _gent, "steady": _steady},
+        own={"fung": _hardening, "gent": _limit},
         sources={
-            "fung": "exponential hardening (Fung 1967); Gent 1996 and Ogden 1972 to the same order",
+            "fung": "exponential hardening (Fung 1967); Ogden 1972 to the same order",
+            "gent": "limiting extensibility, 1/(1 − J/J_m) with J ∝ e² (Gent 1996, doi:10.5254/1.3538357)",
             "steady": "Mooney-Rivlin or Yeoh 1993 term with a constant modulus",
         },
         bends={"contraction": 4},

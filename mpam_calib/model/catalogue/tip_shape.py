@@ -55,6 +55,13 @@ def _round(state: State, values: Values, setting: Setting) -> State:
     return replace(state, length=tip_shortened_length(state.length, R, state.rest, values["tip_factor"]))
 
 
+def _tapered(state: State, values: Values, setting: Setting) -> State:
+    """The ends take the same share of every contraction: Eq. 2.47's length at half of the stroke."""
+    half = 0.5 * setting.stroke
+    lost = 2.0 * (np.pi / 2.0 - 1.0) * (middle_shape(state, setting).R - state.rest.R0) / half
+    return replace(state, length=state.length - values["tip_factor"] * lost * (state.rest.L0 - state.length))
+
+
 register(
     Effect(
         id="tip_shape",
@@ -66,11 +73,12 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"working": _working, "power": _power, "round": _round},
+        forms={"working": _working, "power": _power, "round": _round, "tapered": _tapered},
         own={"power": _exponent},
         sources={
             "working": "thesis Eq. 2.47 with the radius at L′ in place of that at L",
             "power": "textbook: sagitta of an arc over a fixed end, (R − R0)²; a cone of fixed slope, R − R0",
+            "tapered": "conical ends: contraction times k (Tondu and Lopez 2000, doi:10.1109/37.833638)",
             "round": "textbook: hemispherical or elliptical end caps, a length in proportion to R",
         },
         bends={"contraction": 4},
