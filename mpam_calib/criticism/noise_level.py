@@ -8,7 +8,7 @@ Where the declaration lets the noise grow with the force, windows at small and a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
-from mpam_calib.criticism.noise_windows import DEGREE, Windows, between_strokes, inside_strokes
+from mpam_calib.criticism.noise_windows import DEGREE, Windows, between_strokes, inside_strokes, whole_strokes
 from mpam_calib.model.model import Model
 from mpam_calib.model.noise import CORRELATED, GROWTH, TIME, WHITE, grown
 from mpam_calib.posterior.covariance import fast_noise_covariance, fast_noise_log_likelihood
@@ -29,8 +29,11 @@ HIGHEST = 6
 """Highest degree that is taken out of windows: at lower ones the curve itself could pass for noise ..."""
 LEFT = 1.15
 """... and times the noise that a higher one leaves a lower one is believed up to: it tells more."""
-COMES_BACK = 0.6
-"""Share of what strokes and their differences say of the noise below which they contradict each other."""
+ABSENT = {WHITE: 1.0, CORRELATED: 0.0, TIME: 1.0, GROWTH: 0.0}
+"""What stands for a size that the model does not have."""
+CONTRADICTS = 20.0
+"""Nats that strokes and their differences may lose by one noise for both. With sensors' noise they lose up to
+twelve, with structure that only one of them sees a hundred."""
 
 
 @dataclass(frozen=True)
@@ -56,16 +59,15 @@ def noise_level(loops: Loops, model: Model) -> NoiseLevel | None:
     cycle; a snap does not come back, but stands out of its stroke. So where differences of strokes and the
     strokes themselves contradict each other, the smaller noise is the sensor's and the rest is structure.
     """
-    inside = _believed(inside_strokes, loops, model)
-    across = _believed(between_strokes, loops, model)
+    inside = _believed([inside_strokes(loops, degree) for degree in range(DEGREE, HIGHEST + 1)], loops, model)
+    across = _believed([between_strokes(loops)], loops, model)
     if inside is None or across is None:
-        found = inside or across
-        return None if found is None else _mode([found.windows], loops.averaged, model)
-    if across.typical < COMES_BACK * inside.typical:
-        return across.level
-    if inside.typical < COMES_BACK * across.typical:
-        return inside.level
-    return _mode([inside.windows, across.windows], loops.averaged, model)
+        told = inside or across
+        alone = whole_strokes(loops) if told is None else told.windows
+        return None if alone is None else _mode([alone], loops.averaged, model)
+    both = _mode([inside.windows, across.windows], loops.averaged, model)
+    lost = sum(_lost(told, both, loops.averaged, model) for told in (inside, across))
+    return both if lost <= CONTRADICTS else min(inside, across, key=lambda told: told.typical).level
 
 
 class _Told(NamedTuple):
@@ -76,12 +78,11 @@ class _Told(NamedTuple):
     typical: float
 
 
-def _believed(cut: Callable[[Loops, int], Windows | None], loops: Loops, model: Model) -> _Told | None:
-    """Windows of the lowest degree that leaves hardly more than higher ones; None where there are none."""
-    every: list[_Told] = []
+def _believed(cut: Sequence[Windows | None], loops: Loops, model: Model) -> _Told | None:
+    """The first windows, by rising degree, that leave hardly more than others do; None if there are none."""
     scale = 1.0 if model.setting is None else model.setting.force_scale
-    for degree in range(DEGREE, HIGHEST + 1):
-        windows = cut(loops, degree)
+    every: list[_Told] = []
+    for windows in cut:
         if windows is not None:
             level = _mode([windows], loops.averaged, model)
             grows = grown(np.array(level.growth), windows.force, scale)
@@ -95,27 +96,18 @@ def _mode(seen: list[Windows], averaged: int, model: Model) -> NoiseLevel:
     names = [name for name in (WHITE, CORRELATED, TIME, GROWTH) if name in model.names]
     priors = {p.name: p.prior for p in model.parameters}
     scale = 1.0 if model.setting is None else model.setting.force_scale
-    usual = [windows.usual(GROWTH in names) for windows in seen]
 
-    def values(u: Array) -> list[Array]:
-        given = {name: priors[name].from_normal(u[i : i + 1]) for i, name in enumerate(names)}
-        absent = {WHITE: 1.0, CORRELATED: 0.0, TIME: 1.0, GROWTH: 0.0}
-        return [given.get(name, np.array([absent[name]])) for name in absent]
-
-    def log_likelihood(windows: Windows, sizes: list[Array]) -> Array:
-        *noise, growth = sizes
-        if GROWTH not in names:
-            return fast_noise_log_likelihood(windows.scatter, averaged, *noise)
-        covariance = fast_noise_covariance(windows.scatter, averaged, *noise)
-        grows = grown(growth[:, None], windows.force, scale)
-        return chunk_log_likelihood(covariance, windows.chunks, grows)
+    def level(u: Array) -> NoiseLevel:
+        given = {name: float(priors[name].from_normal(u[i : i + 1])[0]) for i, name in enumerate(names)}
+        return NoiseLevel(*(given.get(name, absent) for name, absent in ABSENT.items()))
 
     def negative(u: Array) -> float:
         if np.any(np.abs(u) > 12.0):
             return 1e12
-        sizes = values(u)
-        return float(0.5 * u @ u - sum(log_likelihood(windows, sizes)[0] for windows in usual))
+        noise = level(u)
+        return float(0.5 * u @ u) - sum(_log_likelihood(w, noise, averaged, scale) for w in usual)
 
+    usual = [windows.usual(GROWTH in names) for windows in seen]
     # Left to itself the search starts with steps of 0.00025 at zero, and ends there.
     start = np.zeros(len(names))
     end = optimize.minimize(
@@ -128,4 +120,22 @@ def _mode(seen: list[Windows], averaged: int, model: Model) -> NoiseLevel:
             "initial_simplex": np.concatenate([start[None], np.eye(len(names))]),
         },
     )
-    return NoiseLevel(*(float(v[0]) for v in values(end.x)))
+    return level(end.x)
+
+
+def _lost(told: _Told, noise: NoiseLevel, averaged: int, model: Model) -> float:
+    """Nats that windows lose by another noise than their own."""
+    scale = 1.0 if model.setting is None else model.setting.force_scale
+    usual = told.windows.usual(GROWTH in model.names)
+    own, other = (_log_likelihood(usual, n, averaged, scale) for n in (told.level, noise))
+    return own - other
+
+
+def _log_likelihood(windows: Windows, noise: NoiseLevel, averaged: int, scale: float) -> float:
+    """Log likelihood (nats) of what usual windows see; growth is stated for the force ``scale``, N."""
+    sizes = [np.array([size]) for size in (noise.white, noise.correlated, noise.time)]
+    if noise.growth == 0.0:
+        return float(fast_noise_log_likelihood(windows.scatter, averaged, *sizes)[0])
+    covariance = fast_noise_covariance(windows.scatter, averaged, *sizes)
+    grows = grown(np.array([[noise.growth]]), windows.force, scale)
+    return float(chunk_log_likelihood(covariance, windows.chunks, grows)[0])

@@ -57,20 +57,22 @@ class Windows(NamedTuple):
 
 
 def inside_strokes(loops: Loops, degree: int = DEGREE) -> Windows | None:
-    """Detrended windows of consecutive rows inside strokes, away from their ends; None where there are none.
+    """Detrended windows of consecutive rows inside strokes, away from their ends; None if they are short."""
+    size = min(WINDOW, int(np.median(loops.strokes[1])) // 4)
+    if size < max(degree + 3, DEGREE + 4):
+        return None
+    return _cut(loops, size, max(size // 4, 2), degree)
 
-    Where strokes are too short for any degree, each is one window.
-    """
+
+def whole_strokes(loops: Loops) -> Windows | None:
+    """Short strokes as one window each; a stiffer curve is taken out, since far rows see the muscle's own."""
+    size = min(WINDOW, int(np.quantile(loops.strokes[1], 0.25)))
+    return None if size < SHORT_DEGREE + 3 else _cut(loops, size, 0, SHORT_DEGREE)
+
+
+def _cut(loops: Loops, size: int, margin: int, degree: int) -> Windows | None:
+    """Windows of so many rows, a margin away from the ends of strokes."""
     first, length = loops.strokes
-    typical = int(np.median(length))
-    size, margin = min(WINDOW, typical // 4), max(min(WINDOW, typical // 4) // 4, 2)
-    if size < degree + 3 and degree > DEGREE:
-        return None
-    if size < DEGREE + 4:
-        # The whole stroke, with a stiffer curve taken out: differences of far rows see the curve itself.
-        size, degree, margin = min(WINDOW, int(np.quantile(length, 0.25))), SHORT_DEGREE, 0
-    if size < degree + 3:
-        return None
     starts = [
         np.arange(f + margin, f + n - margin - size + 1, size)
         for f, n in zip(first, length, strict=True)
@@ -87,7 +89,7 @@ def inside_strokes(loops: Loops, degree: int = DEGREE) -> Windows | None:
     return _detrended(loops.force_N[index], loops.force_N[index].mean(axis=1), degree, dt)
 
 
-def between_strokes(loops: Loops, degree: int = DEGREE) -> Windows | None:
+def between_strokes(loops: Loops) -> Windows | None:
     """The same from differences of strokes that repeat each other; None where these are few or short.
 
     What the muscle does, and whatever is wrong with it, comes back in the next cycle; noise does not. A
@@ -98,8 +100,9 @@ def between_strokes(loops: Loops, degree: int = DEGREE) -> Windows | None:
     if len(pairs) < FEWEST_PAIRS:
         return None
     rows_each = length[pairs].min(axis=1)
-    size = min(LONG_WINDOW, int(np.quantile(rows_each, 0.25)))
-    if size < degree + 4:
+    # Long windows tell more than many: of strokes at two speeds the fast ones may be left out.
+    size = min(LONG_WINDOW, int(np.quantile(rows_each, 0.5, method="higher")))
+    if size < DEGREE + 4:
         return None
     counts = rows_each // size
     within = np.concatenate([np.arange(n) for n in counts]) * size
@@ -108,7 +111,7 @@ def between_strokes(loops: Loops, degree: int = DEGREE) -> Windows | None:
     rows = starts[:, :, None] + np.arange(size)
     difference = (loops.force_N[rows[:, 0]] - loops.force_N[rows[:, 1]]) / np.sqrt(2.0)
     dt = float(np.median((loops.time_s[rows[:, 0, -1]] - loops.time_s[rows[:, 0, 0]]) / (size - 1)))
-    return _detrended(difference, loops.force_N[rows].mean(axis=(1, 2)), degree, dt)
+    return _detrended(difference, loops.force_N[rows].mean(axis=(1, 2)), DEGREE, dt)
 
 
 def _repeated(loops: Loops) -> Ints:
