@@ -83,7 +83,7 @@ def fit(
 
     ``start`` gives coordinates by parameter name to start from (0 otherwise); ``blueprint`` another
     declared simulation than the problem's; ``doubts`` how far the effects' forms may be off, with equal
-    prior probabilities (none: not at all).
+    prior probabilities (none: not at all). Raises ``LinAlgError`` where no climb from there ends.
     """
     key = (blueprint or problem.blueprint).model_dump_json()
     chain, n = chain_for(key, effects), len(problem)
@@ -110,7 +110,9 @@ def fit(
 
 
 def _fitted(effects: frozenset[str], climb: Climb, place: Place, doubt: float) -> Fit:
-    """The fit at a mode, with Laplace's evidence."""
+    """The fit at a mode, with Laplace's evidence; ``LinAlgError`` where the climb met no muscle at all."""
+    if not np.isfinite(place.objective):
+        raise np.linalg.LinAlgError(f"no force at the start of {sorted(effects)}")
     problem, p = climb.problem, climb.chain.linear_size
     eta, zeta = np.split(place.eta, [p])
     J = climb.slopes(place)

@@ -181,3 +181,10 @@ def test_a_law_far_from_the_declared_one_is_reached(null_problem: Problem) -> No
     found = fit(null_problem.with_force(0.5 * (both[:n] + both[n:])), effects, 0)
     assert found.u[first] == pytest.approx(3.5, abs=0.3)
     assert found.chi2 < 0.05 * n, "what prior and bow leave"
+
+
+def test_a_start_that_is_no_muscle_is_refused(null_problem: Problem) -> None:
+    """No force is finite there: a search passes over it, as over every climb that does not end."""
+    start = {"tip_factor": float("nan")}
+    with pytest.raises(np.linalg.LinAlgError):
+        fit(null_problem, frozenset({"tip_shape"}), 0, start)
