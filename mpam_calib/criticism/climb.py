@@ -5,7 +5,7 @@ All on the axes that whiten the problem's noise and remainder; both priors enter
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -16,7 +16,7 @@ from scipy.linalg import lapack
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.bend import is_bend
 from mpam_calib.model.chain import Chain, Unsigned
-from mpam_calib.model.priors import LongTailed
+from mpam_calib.model.priors import LongTailed, Parameter
 
 Array = NDArray[np.float64]
 
@@ -47,6 +47,15 @@ DECEIVED = 0.5
 """Nats by which a climb may have been better off than with the force come to rest."""
 COARSE = 0.01
 """Share of the misfit below which the sizes have settled well enough to let them bend."""
+
+
+def furthest_of(parameters: Sequence[Parameter]) -> Array:
+    """Largest coordinate of each parameter, prior sds (d,)."""
+    bounds = [
+        MOST_BENT if is_bend(p.name) else FURTHEST_OUT if isinstance(p.prior, LongTailed) else FURTHEST
+        for p in parameters
+    ]
+    return np.array(bounds, dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -215,8 +224,7 @@ class Climb:
     ) -> Place:
         d = len(u)
         bends = np.array([is_bend(name) for name in self.names], dtype=bool)
-        tailed = np.array([isinstance(p.prior, LongTailed) for p in self.chain.parameters], dtype=bool)
-        furthest = np.where(bends, MOST_BENT, np.where(tailed, FURTHEST_OUT, FURTHEST))
+        furthest = furthest_of(self.chain.parameters)
         released = not bends.any() or bool(np.any(u[bends] != 0.0))
         best: Place | None = None
         J = np.empty((0, 0))

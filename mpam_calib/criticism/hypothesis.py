@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.criticism.climb import FURTHEST
+from mpam_calib.criticism.climb import furthest_of
 from mpam_calib.criticism.fit import Fit, chain_for
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.blueprint import Blueprint
@@ -129,14 +129,15 @@ class Hypothesis:
         start = np.empty(d)
         for i, (own, fitted) in enumerate(zip(self.parameters, self.chain.parameters, strict=True)):
             start[i] = own.prior.to_normal(fitted.prior.from_normal(self.fit.u[i : i + 1]))[0]
-        start = np.clip(np.nan_to_num(start), -FURTHEST, FURTHEST)
+        furthest = furthest_of(self.parameters)
+        start = np.clip(np.nan_to_num(start), -furthest, furthest)
         if d == 0:
             return Mode(start, float(self.log_posterior(start[None])[0]), np.zeros((0, 0)))
         return self._newton(start) or self._climbed(start)
 
     def _newton(self, u: Array) -> Mode | None:
         """Newton's method with differences along the fit's own axes; None where it gets nowhere."""
-        d = len(u)
+        d, furthest = len(u), furthest_of(self.parameters)
         axes = np.linalg.cholesky(self.fit.covariance[:d, :d])
         i, j = np.triu_indices(d, 1)
         e = np.eye(d)
@@ -159,7 +160,7 @@ class Hypothesis:
             gain = 0.5 * float(step @ (back.T @ (up - down))) / (2.0 * NEWTON_REACH)
             if gain < NEWTON_GAIN:
                 return Mode(u + step, float(top) + gain, covariance)
-            tried = np.clip(u + np.array(SHORTER)[:, None] * step, -FURTHEST, FURTHEST)
+            tried = np.clip(u + np.array(SHORTER)[:, None] * step, -furthest, furthest)
             reached = evaluate(self, tried)
             # Where no step leads uphill, the axes were too long for their slopes: these are shorter.
             if reached.max() > top:
