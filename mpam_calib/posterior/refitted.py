@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 SHIFTS, POINTS = 8, 256
 """Randomisations of a round, and points of each."""
-LEAST, ROUNDS = 3, 8
+LEAST, ROUNDS = 4, 8
 """Rounds at least, and at most."""
 ENOUGH = 0.003
 """Error (nats) at which the rounds end."""
