@@ -24,6 +24,7 @@ from mpam_calib.posterior.annealed import anneal
 from mpam_calib.posterior.bridge import Bridge, bridge_evidence
 from mpam_calib.posterior.evidence import Evidence, integrate
 from mpam_calib.posterior.expansion import expand
+from mpam_calib.posterior.hills import hills
 from mpam_calib.posterior.mode import Density, Mode
 from mpam_calib.posterior.refitted import integrate_refitted
 
@@ -165,9 +166,9 @@ def _sizes(
 
 
 def _expanded(density: Density, mode: Mode) -> Evidence:
-    """The evidence of a few parameters: points only where a bound is near or the density is bent."""
+    """The evidence of a few parameters: points only where a bound is near, or the density bent or hilly."""
     expansion = expand(density, mode)
-    if expansion.tame:
+    if expansion.tame and (len(mode.u) > FEW or len(hills(density, mode)) == 1):
         return Evidence(expansion.value, expansion.error, mode.u, mode.covariance)
     return integrate_refitted(density, mode) if 1 < len(mode.u) <= FEW else integrate(density, mode)
 

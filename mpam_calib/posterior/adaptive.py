@@ -30,7 +30,7 @@ HEAVIEST = 0.95
 
 def weigh_adaptively(density: Density, mode: Mode, rng: np.random.RandomState) -> tuple[Rounds, float]:
     """All rounds' weighted draws about a mode, and the error (nats) of their log integral."""
-    points = lead(density, mode, rng)[1]
+    points = lead(density, [mode], rng)[1]
     mixture = refit([mode], points, np.full(len(points), 1.0 / len(points)), LOOKING)
     rounds, error = Rounds(len(mode.u)), float("inf")
     while rounds.count < MOST_ROUNDS and error > ENOUGH:

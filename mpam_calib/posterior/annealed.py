@@ -1,12 +1,12 @@
 """The evidence in many dimensions: a crowd of points is led from Laplace's density to the posterior.
 
-Quadrature does not settle beyond seven or so bent parameters. Here the points begin as draws of a Student-t
-at the mode, q, and pass through densities q^(1 − β) p^β with β from 0 to 1, so slowly that half of them stay
-effective; between the steps they move by differences of each other (sequential Monte Carlo: Del Moral,
-Doucet and Jasra 2006, doi:10.1111/j.1467-9868.2006.00553.x; moves: ter Braak 2006,
-doi:10.1007/s11222-006-8769-1). The way from q is short, from the prior it would be long; modes that lie
-apart are not found. On thin, much bent sheets all crowds lag alike, by nats: ``error`` is therefore not only
-how far they differ, but at least half of what they changed of Laplace's figure.
+Quadrature does not settle beyond seven or so bent parameters. Here the points begin as draws of Student-t
+densities at the modes, q, and pass through densities q^(1 − β) p^β with β from 0 to 1, so slowly that half of
+them stay effective; between the steps they move by differences of each other (sequential Monte Carlo: Del
+Moral, Doucet and Jasra 2006, doi:10.1111/j.1467-9868.2006.00553.x; moves: ter Braak 2006,
+doi:10.1007/s11222-006-8769-1). The way from q is short, from the prior it would be long; other modes that
+lie apart are not found. On thin, much bent sheets all crowds lag alike, by nats: ``error`` is therefore not
+only how far they differ, but at least half of what they changed of Laplace's figure.
 """
 
 from __future__ import annotations
@@ -40,17 +40,16 @@ STEPS, SHORTEST = 30, 1e-12
 
 def anneal(density: Density, mode: Mode, seed: int = 0) -> Evidence:
     """Evidence of the density about a mode; mean and covariance are those of the points at the end."""
-    log_z, u = lead(
-        density, mode, np.random.RandomState(np.random.SeedSequence([seed, 12]).generate_state(1)[0])
-    )
+    rng = np.random.RandomState(np.random.SeedSequence([seed, 12]).generate_state(1)[0])
+    log_z, u = lead(density, [mode], rng)
     value, error = scatter(log_z[:, None])
     error = max(error, 0.5 * abs(value - mode.log_evidence))
     return Evidence(value, error, u.mean(axis=0), np.cov(u.T))
 
 
-def lead(density: Density, mode: Mode, rng: np.random.RandomState) -> tuple[Array, Array]:
+def lead(density: Density, modes: list[Mode], rng: np.random.RandomState) -> tuple[Array, Array]:
     """Each crowd's log evidence (CROWDS,), and where all points (CROWDS·POINTS, d) end."""
-    points = _Points.drawn(density, mode, rng)
+    points = _Points.drawn(density, modes, rng)
     reached, log_z = 0.0, np.zeros(CROWDS)
     for number in range(STEPS):
         if reached == 1.0:
@@ -76,11 +75,11 @@ class _Points:
     log_p: Array
 
     @staticmethod
-    def drawn(density: Density, mode: Mode, rng: np.random.RandomState) -> _Points:
+    def drawn(density: Density, modes: list[Mode], rng: np.random.RandomState) -> _Points:
         """Draws of q."""
-        start = StudentMixture.build([mode.u], [mode.covariance])
+        start = StudentMixture.build([m.u for m in modes], [m.covariance for m in modes])
         u = start.draw(CROWDS * POINTS, rng)
-        return _Points(density, start, u, start.log_density(u), _floored(evaluate(density, u)))
+        return _Points(density, start, u, start.log_density(u), floored(evaluate(density, u)))
 
     def keep(self, index: NDArray[np.int64]) -> None:
         """These alone (some of them more than once) go on."""
@@ -96,14 +95,14 @@ class _Points:
             one, two = (np.take_along_axis(others, pick, axis=1).ravel() for pick in picks)
             step = length * BEST / np.sqrt(2.0 * self.u.shape[1]) * (self.u[one] - self.u[two])
             tried = self.u[at] + step + JITTER * rng.standard_normal(step.shape)
-            log_q, log_p = self.start.log_density(tried), _floored(evaluate(self.density, tried))
+            log_q, log_p = self.start.log_density(tried), floored(evaluate(self.density, tried))
             gain = reached * (log_p - self.log_p[at]) + (1.0 - reached) * (log_q - self.log_q[at])
             taken = np.log(rng.random_sample(len(at))) < gain
             self.u[at[taken]] = tried[taken]
             self.log_q[at[taken]], self.log_p[at[taken]] = log_q[taken], log_p[taken]
 
 
-def _floored(log_p: Array) -> Array:
+def floored(log_p: Array) -> Array:
     """Impossible points as merely hopeless ones."""
     return np.where(np.isfinite(log_p), log_p, -1e30)
 

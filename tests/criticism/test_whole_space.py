@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from criticism.test_evidence import dense, inside
 from criticism.test_hypotheses import problem_of
@@ -15,6 +16,7 @@ from mpam_calib.criticism.evidence import FEW, NEGLIGIBLE, SETTLES, log_evidence
 from mpam_calib.criticism.hypothesis import Hypothesis
 from mpam_calib.criticism.problem import SIZE_PRIOR, Problem
 from mpam_calib.criticism.ranking import Ranked
+from mpam_calib.posterior import refitted
 from mpam_calib.posterior.evidence import integrate
 from mpam_calib.posterior.refitted import integrate_refitted
 from mpam_calib.specimen import read
@@ -24,30 +26,31 @@ WELL = 4.0
 """Sds above its bound at 0 from which a size is well inside."""
 ALLOWED, ALLOWED_NEAR = 0.02, 0.1
 """Nats that the evidence may miss where all sizes are well inside, and elsewhere."""
-SHARE = 0.9
-"""Share of those well inside that must be within the first. All are wanted: on Festo's map the rule and its
-reference differ by up to 0.027 in four of 41, and neither's error says so."""
 MILLISECONDS = 20.0
-SEEDS = (1, 2, 3)
+SEEDS, POINTS = (1, 2), 2
+"""Those of the reference, and its points in the rule's."""
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["mpam1_reconstructed", "mpam2_reconstructed", "festo_dmsp10"])
-def test_what_ranks_is_the_quadrature(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_ranks_is_the_quadrature(
+    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Of all models of up to seven parameters within 50 nats of the best, whatever remainder matters.
 
-    The reference is a dense grid in one or two dimensions, elsewhere the mean of the rule with other seeds,
-    which has an error of its own. Laplace's first term alone is printed beside it.
+    The reference is a dense grid in one or two dimensions, elsewhere the mean of the rule with other seeds
+    and more points. Laplace's first term alone is printed beside it.
     """
     specimen = read(DATASETS / name)
     problem = problem_of(specimen)
     models = [s for s in space.model_space(specimen) if s.law != ranking.EACH]
     start = time.process_time()
-    ranked = [r for s in models if (r := ranking.fitted(problem, s)) is not None]
+    with threadpool_limits(1):
+        ranked = [r for s in models if (r := ranking.fitted(problem, s)) is not None]
     each = 1e3 * (time.process_time() - start) / len(models)
     near = max(r.log_evidence for r in ranked) - ranking.NEAR
     leading = [r for r in ranked if r.log_evidence >= near and 0 < len(r.best.u) <= SETTLES]
-    away, laplace, ranks = np.array([row for r in leading for row in _off(problem, r)]).T
+    away, laplace, ranks = np.array([row for r in leading for row in _off(problem, r, monkeypatch)]).T
     well = away >= WELL
     with capsys.disabled():
         print(f"\n{name}: {each:.1f} ms of processor time for each of {len(models)} models")
@@ -55,11 +58,13 @@ def test_what_ranks_is_the_quadrature(name: str, capsys: pytest.CaptureFixture[s
             print(f"  {words}: {_counts('Laplace', laplace[here])}; {_counts('what ranks', ranks[here])}")
     assert len(ranks) >= 5
     assert np.all(ranks <= ALLOWED_NEAR)
-    assert np.mean(ranks[well] <= ALLOWED) >= SHARE
+    assert np.all(ranks[well] <= ALLOWED)
     assert each <= MILLISECONDS
 
 
-def _off(problem: Problem, ranked: Ranked) -> list[tuple[float, float, float]]:
+def _off(
+    problem: Problem, ranked: Ranked, monkeypatch: pytest.MonkeyPatch
+) -> list[tuple[float, float, float]]:
     """By size of the remainder: distance to a bound (sds), misses of Laplace and what ranks (nats)."""
     blueprint = ranking.blueprint_of(problem, ranked.simulation)
     rows = []
@@ -72,7 +77,10 @@ def _off(problem: Problem, ranked: Ranked) -> list[tuple[float, float, float]]:
             exact = dense(hypothesis, mode)
         else:
             rule = integrate_refitted if len(mode.u) <= FEW else integrate
-            exact = float(np.mean([rule(hypothesis, mode, seed).value for seed in SEEDS]))
+            with monkeypatch.context() as more:
+                more.setattr(refitted, "POINTS", POINTS * refitted.POINTS)
+                more.setattr(refitted, "PICKED", POINTS * refitted.PICKED)
+                exact = float(np.mean([rule(hypothesis, mode, seed).value for seed in SEEDS]))
         value = log_evidence_beyond_laplace(problem, blueprint, [found])[0] - np.log(SIZE_PRIOR[found.size])
         rows.append((inside(hypothesis, mode), abs(mode.log_evidence - exact), abs(value - exact)))
     return rows

@@ -9,8 +9,9 @@ from mpam_calib.posterior.refitted import integrate_refitted
 
 from .densities import KNOWN, Curved, dimensions_of, mode_of
 
-ALLOWED, ELSEWHERE = 0.02, 0.1
+ALLOWED, ELSEWHERE = 0.01, 0.03
 """Nats, of all seeds; and where a density is bent this much."""
+SEEDS = 20
 FEW = [name for name in KNOWN if 2 <= dimensions_of(KNOWN[name]) <= 4]
 
 
@@ -35,8 +36,26 @@ class Twice:
 
 
 def test_two_bends_at_once():
-    """In four dimensions; the tips, which no point has reached, are missed as at bounds."""
+    """In four dimensions, where Laplace's figure is off by 0.2 nat."""
     mode = mode_of(Twice(), 4)
     assert mode.log_evidence < Twice.exact - ELSEWHERE
     for seed in range(3):
         assert integrate_refitted(Twice(), mode, seed).value == pytest.approx(Twice.exact, abs=ELSEWHERE)
+
+
+def test_the_error_is_what_it_says():
+    """The misses of many seeds are as large as the stated errors, and do not lean to one side."""
+    density = Curved()
+    mode = mode_of(density, 2)
+    found = [integrate_refitted(density, mode, seed) for seed in range(SEEDS)]
+    away = np.array([(f.value - density.exact) / f.error for f in found])
+    assert 0.6 < np.sqrt(np.mean(away**2)) < 1.6
+    assert abs(np.mean(away)) < 1.0
+
+
+def test_far_bent_tips():
+    """Where the tips hold few points the errors are too small, by a factor of three; the figure holds."""
+    density = Curved(0.5)
+    mode = mode_of(density, 2)
+    for seed in range(SEEDS):
+        assert integrate_refitted(density, mode, seed).value == pytest.approx(density.exact, abs=ELSEWHERE)
