@@ -1,8 +1,9 @@
 """Further hills of a density beside a mode, which climbs from one start miss.
 
 Along each coordinate through the mode, the others held, the density is looked at on one fine and one wide
-line; every top there that is not the mode's own is climbed from. An offset of the pressure sensor or of the
-braid's diameter can be right in either direction, and the better one need not be the first that is found.
+line; every top there that is not the mode's own is climbed from, and a hill that is found is looked around
+from in turn. An offset of the pressure sensor or of the braid's diameter can be right in either direction,
+and the better one need not be the first that is found. Hills that no such line crosses stay unseen.
 """
 
 from __future__ import annotations
@@ -22,17 +23,20 @@ OWN = 2.0
 """Such sds within which a top is the mode's own."""
 APART = 4.0
 """Squared distance, for each parameter, from which hills are two."""
+MOST = 6
+"""Hills at most."""
 
 
 def hills(density: Density, mode: Mode) -> list[Mode]:
     """The mode, and any others that are no more than HOPELESS nats below the best."""
     found = [mode]
-    for start in _tops(density, mode):
-        u, top = climb(density, start)
-        if not np.isfinite(top) or top < max(m.log_posterior for m in found) - HOPELESS:
-            continue
-        if all(_distance(m, u) > APART * len(u) for m in found):
-            found.append(Mode(u, top, curvature(density, u, top)))
+    for seen in found:  # grows: a hill may show the next one
+        for start in _tops(density, seen):
+            u, top = climb(density, start)
+            if not np.isfinite(top) or top < max(m.log_posterior for m in found) - HOPELESS:
+                continue
+            if len(found) < MOST and all(_distance(m, u) > APART * len(u) for m in found):
+                found.append(Mode(u, top, curvature(density, u, top)))
     best = max(m.log_posterior for m in found)
     return [m for m in found if m.log_posterior >= best - HOPELESS]
 
