@@ -167,10 +167,10 @@ def _sizes(
 
 def _expanded(density: Density, mode: Mode) -> Evidence:
     """The evidence of a few parameters: points only where a bound is near, or the density bent or hilly."""
-    expansion = expand(density, mode)
-    if expansion.tame and (len(mode.u) > FEW or len(hills(density, mode)) == 1):
+    expansion, few = expand(density, mode), 1 < len(mode.u) <= FEW
+    if expansion.tame and not (few and len(hills(density, mode)) > 1):
         return Evidence(expansion.value, expansion.error, mode.u, mode.covariance)
-    return integrate_refitted(density, mode) if 1 < len(mode.u) <= FEW else integrate(density, mode)
+    return integrate_refitted(density, mode) if few else integrate(density, mode)
 
 
 def _integral(hypothesis: Hypothesis, mode: Mode, rates: Rates | None) -> Evidence:
