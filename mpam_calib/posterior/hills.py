@@ -2,8 +2,8 @@
 
 Along each coordinate through the mode, the others held, the density is looked at on one fine and one wide
 line; every top there that is not the mode's own is climbed from, and a hill that is found is looked around
-from in turn. An offset of the pressure sensor or of the braid's diameter can be right in either direction,
-and the better one need not be the first that is found. Hills that no such line crosses stay unseen.
+from in turn. The rates of a law can have either sign, and the better one need not be the first that is
+found. Hills that no such line crosses stay unseen.
 """
 
 from __future__ import annotations
