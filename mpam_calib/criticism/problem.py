@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from mpam_calib.criticism.noise_level import NoiseLevel, noise_level
-from mpam_calib.criticism.rows import Rows, saturated, telling_points, telling_strokes
+from mpam_calib.criticism.rows import Rows, telling_points, telling_strokes
+from mpam_calib.criticism.saturation import along_a_ceiling, saturated
 from mpam_calib.criticism.whitening import Whitening
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
@@ -256,13 +257,16 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     ties: list[Array] = []
     loops, beyond = specimen.loops, 0.0
     if loops is not None:
-        out = saturated(loops)
-        loops, beyond = loops.without(out), float(out.mean())
+        every = len(loops.force_N)
+        loops = loops.without(saturated(loops))
+        noise = noise_level(loops, model)
+        if noise is not None:
+            loops = loops.without(along_a_ceiling(loops, noise.total))
+        beyond = 1.0 - len(loops.force_N) / every
         looked_at = telling_strokes(loops.clear)
         bins = bin_loops(loops, int(np.clip(ROWS // len(looked_at), 8, 32)), finest=1)
         n = len(bins)
         keep = np.flatnonzero(~bins.slack & np.isin(bins.segment, looked_at))
-        noise = noise_level(loops, model)
         if noise is None:
             guess = model.setting.force_sd or _from_differences(bins.force, bins.segment)
             noise = NoiseLevel(guess, 0.0, 1.0)

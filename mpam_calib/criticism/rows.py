@@ -1,4 +1,4 @@
-"""The raw readings behind the reduced rows, and which of them the load cell could not show."""
+"""The raw readings behind the reduced rows, and which of them are looked at."""
 
 from __future__ import annotations
 
@@ -17,12 +17,6 @@ Ints = NDArray[np.int64]
 
 MOST_ROWS = 40_000
 """Raw readings that are kept: whole strokes, from the first on."""
-TIES, TIES_SHARE = 10, 0.005
-"""A load cell saturates where so many readings, and such a share of them, are the same extreme value ..."""
-OUTSTANDING = 8.0
-"""... and so many times as many as at the next values (a coarse converter repeats all of them)."""
-NEXT = 5
-
 MOST_STROKES, MOST_POINTS = 90, 600
 """Strokes, and static readings, that are looked at: what a search costs grows with their cube."""
 
@@ -45,18 +39,6 @@ class Rows:
             keep = keep & (loops.stroke < loops.stroke[MOST_ROWS])
         index = np.flatnonzero(keep)
         return Rows(row_readings(loops).take(index), loops.force_N[index], loops.stroke[index])
-
-
-def saturated(loops: Loops) -> NDArray[np.bool_]:
-    """Readings (rows,) at an end of the load cell's range that many share; the declared floor is none."""
-    values, counts = np.unique(loops.force_N[~loops.censored], return_counts=True)
-    found = np.zeros(len(loops.force_N), dtype=bool)
-    ends = ((values[-1], counts[-1], counts[-1 - NEXT : -1]), (values[0], counts[0], counts[1 : 1 + NEXT]))
-    for value, count, near in ends:
-        enough = count >= max(TIES, TIES_SHARE * len(found))
-        if enough and len(near) and count > OUTSTANDING * near.mean():
-            found |= (loops.force_N == value) & ~loops.censored
-    return found
 
 
 def telling_strokes(loops: Loops) -> Ints:

@@ -110,7 +110,7 @@ def _left(content: dict[str, Any]) -> list[str]:
     found = []
     if content["saturated_share"] > 0.0:
         share = significant(100.0 * content["saturated_share"])
-        found.append(f"the load cell saturates: {share} % of the readings are one and the same extreme value")
+        found.append(f"the load cell saturates: {share} % of the readings lie at one extreme force")
     if content["repeating_N"] > 0.0:
         size = significant(content["repeating_N"])
         found.append(f"a fine structure of {size} N comes back in every stroke at the same place")

@@ -13,7 +13,7 @@ from scipy import stats
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.repeat import repeating_rms
-from mpam_calib.criticism.rows import saturated
+from mpam_calib.criticism.saturation import along_a_ceiling, saturated
 from mpam_calib.criticism.structure import structure_tests
 from mpam_calib.specimen import Specimen
 
@@ -113,3 +113,32 @@ def test_a_saturated_cell_is_seen_and_left_out(specimen: Specimen) -> None:
     # A coarse converter repeats every value: that is no saturation.
     step = 0.1 * float(np.ptp(loops.force_N)) / 2.0
     assert not saturated(replace(loops, force_N=step * np.round(loops.force_N / step))).any()
+
+
+@pytest.mark.parametrize("name", [*NULLS, "develop-separable-001", "develop-separable-003"])
+@pytest.mark.parametrize("share", [0.0, 0.1])
+def test_a_ceiling_is_seen_through_noise(name: str, share: float) -> None:
+    """A cell that saturates before its noise is added; without a ceiling nothing is one."""
+    loops = specimen_of(name).loops
+    assert loops is not None
+    noise = problem_of(specimen_of(name)).noise_level.total
+    limit = float(np.quantile(loops.force_N, 1.0 - share))
+    above = loops.force_N >= limit if share else np.zeros(len(loops.force_N), dtype=bool)
+    after = noise * np.random.default_rng(3).standard_normal(len(above))
+    clipped = replace(loops, force_N=np.where(above, limit + after, loops.force_N))
+    found = along_a_ceiling(clipped, noise)
+    assert not saturated(clipped).any()
+    assert found.mean() == pytest.approx(share, abs=0.3 * share)
+    assert not np.any(found & ~above & (loops.force_N < limit - 3.0 * noise))
+
+
+def test_readings_along_a_ceiling_are_left_out(specimen: Specimen) -> None:
+    loops = specimen.loops
+    assert loops is not None
+    noise = problem_of(specimen).noise_level.total
+    limit = float(np.quantile(loops.force_N, 0.9))
+    after = noise * np.random.default_rng(4).standard_normal(len(loops.force_N))
+    force = np.where(loops.force_N >= limit, limit + after, loops.force_N)
+    problem = problem_of(replace(specimen, loops=replace(loops, force_N=force)))
+    assert problem.saturated == pytest.approx(0.1, abs=0.03)
+    assert problem.force.max() < limit + noise

@@ -14,8 +14,9 @@ from criticism.test_hypotheses import problem_of
 from mpam_calib.criticism import ranking, space
 from mpam_calib.criticism.evidence import FEW, NEGLIGIBLE, SETTLES, log_evidence_beyond_laplace
 from mpam_calib.criticism.hypothesis import Hypothesis
-from mpam_calib.criticism.problem import SIZE_PRIOR, Problem
+from mpam_calib.criticism.problem import SIZE_PRIOR
 from mpam_calib.criticism.ranking import Ranked
+from mpam_calib.criticism.spread import held_problem, spread_over
 from mpam_calib.posterior import refitted
 from mpam_calib.posterior.evidence import integrate
 from mpam_calib.posterior.refitted import integrate_refitted
@@ -33,9 +34,7 @@ SEEDS, POINTS = (1, 2), 2
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["mpam1_reconstructed", "mpam2_reconstructed", "festo_dmsp10"])
-def test_what_ranks_is_the_quadrature(
-    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_ranks_is_the_quadrature(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Of all models of up to seven parameters within 50 nats of the best, whatever remainder matters.
 
     The reference is a dense grid in one or two dimensions, elsewhere the mean of the rule with other seeds
@@ -50,7 +49,8 @@ def test_what_ranks_is_the_quadrature(
     each = 1e3 * (time.process_time() - start) / len(models)
     near = max(r.log_evidence for r in ranked) - ranking.NEAR
     leading = [r for r in ranked if r.log_evidence >= near and 0 < len(r.best.u) <= SETTLES]
-    away, laplace, ranks = np.array([row for r in leading for row in _off(problem, r, monkeypatch)]).T
+    with threadpool_limits(1), spread_over(problem, 2) as spread:
+        away, laplace, ranks = np.array([row for rows in spread(_off, leading) for row in rows]).T
     well = away >= WELL
     with capsys.disabled():
         print(f"\n{name}: {each:.1f} ms of processor time for each of {len(models)} models")
@@ -62,10 +62,9 @@ def test_what_ranks_is_the_quadrature(
     assert each <= MILLISECONDS
 
 
-def _off(
-    problem: Problem, ranked: Ranked, monkeypatch: pytest.MonkeyPatch
-) -> list[tuple[float, float, float]]:
+def _off(ranked: Ranked) -> list[tuple[float, float, float]]:
     """By size of the remainder: distance to a bound (sds), misses of Laplace and what ranks (nats)."""
+    problem = held_problem()
     blueprint = ranking.blueprint_of(problem, ranked.simulation)
     rows = []
     for found in ranked.fits:
@@ -77,7 +76,7 @@ def _off(
             exact = dense(hypothesis, mode)
         else:
             rule = integrate_refitted if len(mode.u) <= FEW else integrate
-            with monkeypatch.context() as more:
+            with pytest.MonkeyPatch.context() as more:
                 more.setattr(refitted, "POINTS", POINTS * refitted.POINTS)
                 more.setattr(refitted, "PICKED", POINTS * refitted.PICKED)
                 exact = float(np.mean([rule(hypothesis, mode, seed).value for seed in SEEDS]))
