@@ -14,7 +14,7 @@ from mpam_calib.criticism.gain import Gain, measure_gain
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.search import LARGEST, Search, Set, search
 from mpam_calib.criticism.structure import Structure, structure_tests
-from mpam_calib.criticism.verdict import BESIDE, LISTED, Verdict, judge
+from mpam_calib.criticism.verdict import Verdict, judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
 from mpam_calib.model.effect import effect
@@ -90,16 +90,10 @@ def diagnose(
 def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
     """The content of ``diagnosis.json``."""
     verdict, budget, gain = diagnosis.verdict, diagnosis.budget, diagnosis.gain
-    least = max(verdict.probabilities.values()) * np.exp(-BESIDE)
-    others = [
-        {"ids": sorted(s), "probability": _round(p)}
-        for s, p in verdict.probabilities.items()
-        if s != verdict.standing and p >= least
-    ]
     content: dict[str, Any] = {
         "verdict": verdict.word,
         "causes": [_cause(diagnosis, e, seed) for e in diagnosis.causes],
-        "alternatives": others[: 2 * LISTED],
+        "alternatives": [{"ids": sorted(s), "probability": _round(p)} for s, p in verdict.others().items()],
         "not_tested": [{"id": i, "why": why} for i, why in diagnosis.candidates.not_tested],
         "noise_N": _round(budget.noise),
         "misfit_before_N": _round(budget.before),
@@ -118,6 +112,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         ],
         "saturated_share": _round(diagnosis.problem.saturated),
         "repeating_N": _round(verdict.repeating),
+        "bursts_N": _round(verdict.bursts),
         "searched": {
             "sets": len(diagnosis.search.seen | {effects for effects, _ in diagnosis.search.searched}),
             "largest": LARGEST,

@@ -28,8 +28,8 @@ SURE = 6.0
 """Standard deviations above that."""
 
 
-def repeating_rms(rows: Rows, blueprint_json: str, fitted: Fit) -> float:
-    """Root mean square (N) of the fine structure that a branch's strokes share; 0 where noise explains it.
+def raw_residual(rows: Rows, blueprint_json: str, fitted: Fit) -> Array:
+    """What a fit leaves of the raw readings, N (rows,).
 
     ``blueprint_json`` is the declared simulation that ``fitted`` extends.
     """
@@ -38,7 +38,14 @@ def repeating_rms(rows: Rows, blueprint_json: str, fitted: Fit) -> float:
         p.name: p.prior.from_normal(u[None, None]) for p, u in zip(chain.parameters, fitted.u, strict=True)
     }
     force = chain.force(values or {"": np.zeros((1, 1))}, fitted.eta[None, :], rows.readings)
-    residual = rows.force - np.broadcast_to(force, (1, len(rows.force)))[0]
+    return np.asarray(rows.force - np.broadcast_to(force, (1, len(rows.force)))[0])
+
+
+def repeating_rms(rows: Rows, residual: Array) -> float:
+    """Root mean square (N) of the fine structure that a branch's strokes share; 0 where noise explains it.
+
+    ``residual`` (rows,) is what a fit leaves, N.
+    """
     rng = np.random.default_rng(0)
     found = [0.0]
     for sign in np.unique(rows.readings.sign):

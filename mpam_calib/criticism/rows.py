@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.bins import beyond_floor
 from mpam_calib.posterior.points import Points
 from mpam_calib.posterior.row_motion import row_readings
 from mpam_calib.specimen.recording import Loops
@@ -23,7 +24,7 @@ MOST_STROKES, MOST_POINTS = 90, 600
 
 @dataclass(frozen=True)
 class Rows:
-    """Raw readings (n,) in strokes: what the model needs, force (N), stroke; not censored, not unclear."""
+    """Raw readings (n,) in strokes: what the model needs, force (N), stroke; not slack, not unclear."""
 
     readings: Readings
     force: Array
@@ -32,13 +33,22 @@ class Rows:
     @staticmethod
     def of(loops: Loops) -> Rows:
         """The first strokes of the loops."""
-        keep = ~loops.censored
-        if loops.unclear is not None:
-            keep = keep & ~loops.unclear
+        clear = loops.clear
+        keep = np.ones(len(loops.force_N), dtype=bool) if loops.unclear is None else ~loops.unclear
+        keep[keep] = ~(_slack(clear) | beyond_floor(clear, clear.strokes[0]))
         if len(keep) > MOST_ROWS:
             keep = keep & (loops.stroke < loops.stroke[MOST_ROWS])
         index = np.flatnonzero(keep)
         return Rows(row_readings(loops).take(index), loops.force_N[index], loops.stroke[index])
+
+
+def _slack(loops: Loops) -> NDArray[np.bool_]:
+    """Readings (rows,) from a stroke's first slack one to its last: noise lifts some off the floor."""
+    first, length = loops.strokes
+    index = np.arange(len(loops.stroke))
+    begin = np.minimum.reduceat(np.where(loops.censored, index, len(index)), first)
+    end = np.maximum.reduceat(np.where(loops.censored, index, -1), first)
+    return np.asarray((index >= np.repeat(begin, length)) & (index <= np.repeat(end, length)))
 
 
 def telling_strokes(loops: Loops) -> Ints:

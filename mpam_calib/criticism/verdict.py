@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice
 from typing import Literal
 
 import numpy as np
 
 from mpam_calib.criticism.budget import remainder_rms, structured
+from mpam_calib.criticism.bursts import bursts_rms
 from mpam_calib.criticism.problem import SIZES
-from mpam_calib.criticism.repeat import repeating_rms
+from mpam_calib.criticism.repeat import raw_residual, repeating_rms
 from mpam_calib.criticism.search import Search, Set
+from mpam_calib.model.noise import grown
 
 Word = Literal["adequate", "named", "ambiguous", "unexplained"]
 
@@ -32,7 +35,8 @@ class Verdict:
     """The word, the leading set, and every set with its probability (best first).
 
     ``standing`` are the causes that hold even beside a remainder; ``size`` indexes the remainder's size
-    under the leading set; ``repeating`` (N) is the fine structure that the strokes share.
+    under the leading set; ``repeating`` (N) is the fine structure that the strokes share, ``bursts`` (N) that
+    of readings that stand out of their strokes.
     """
 
     word: Word
@@ -42,6 +46,13 @@ class Verdict:
     marginals: dict[str, float]
     size: int
     repeating: float = 0.0
+    bursts: float = 0.0
+
+    def others(self) -> dict[Set, float]:
+        """Sets other than the standing one that come near the likeliest, with their probabilities."""
+        least = max(self.probabilities.values()) * np.exp(-BESIDE)
+        near = ((s, p) for s, p in self.probabilities.items() if s != self.standing and p >= least)
+        return dict(islice(near, 2 * LISTED))
 
 
 def judge(found: Search) -> Verdict:
@@ -55,14 +66,14 @@ def judge(found: Search) -> Verdict:
     leading = sets[0]
     size = found.best_size(leading)
     problem = found.problem
-    repeating = _repeating(found, leading, size)
+    repeating, bursts = _fine(found, leading, size)
     fine = repeating > REPEAT_SIZE * problem.noise_level.total
     unlessened = bool(leading) and not _lessens(found, leading)
-    if problem.saturated > 0.0 or fine or unlessened or _structure_left(found, leading, size):
+    if problem.saturated > 0.0 or fine or bursts > 0.0 or unlessened or _structure_left(found, leading, size):
         standing = _standing(found, leading)
         if not _lessens(found, standing):
             standing = frozenset()
-        return Verdict("unexplained", leading, standing, probabilities, marginals, size, repeating)
+        return Verdict("unexplained", leading, standing, probabilities, marginals, size, repeating, bursts)
     if not leading and probabilities[leading] > 0.5:
         return Verdict("adequate", leading, frozenset(), probabilities, marginals, size)
     lead = scores[0] - scores[1] if len(scores) > 1 else np.inf
@@ -97,12 +108,17 @@ def _lessens(found: Search, effects: Set) -> bool:
     return after <= structured(problem, found.refit(frozenset(), 0))
 
 
-def _repeating(found: Search, leading: Set, size: int) -> float:
-    """Fine structure (N) that the strokes share and the leading set leaves."""
-    rows = found.problem.rows
-    if rows is None:
-        return 0.0
-    return repeating_rms(rows, found.problem.blueprint.model_dump_json(), found.fits[leading, size])
+def _fine(found: Search, leading: Set, size: int) -> tuple[float, float]:
+    """What the leading set leaves of the raw readings: fine structure that strokes share, and bursts (N)."""
+    problem = found.problem
+    if problem.rows is None:
+        return 0.0, 0.0
+    rows, noise = problem.rows, problem.noise_level
+    residual = raw_residual(rows, problem.blueprint.model_dump_json(), found.fits[leading, size])
+    grows = grown(np.array(noise.growth), rows.force, problem.force_scale)
+    # Tails that were declared are no bursts.
+    bursts = 0.0 if problem.blueprint.noise.robust else bursts_rms(rows, residual, grows)
+    return repeating_rms(rows, residual), bursts
 
 
 def _standing(found: Search, leading: Set) -> Set:

@@ -130,7 +130,7 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
         speed, travel, reversal, at_level = (x[clear] for x in (speed, travel, reversal, at_level))
         loops = loops.clear
         stroke_starts, lengths = loops.strokes
-    beyond = _beyond_floor(loops, stroke_starts)
+    beyond = beyond_floor(loops, stroke_starts)
     per_stroke = [
         np.union1d(_edges(part, most, finest), np.flatnonzero(np.diff(slack, prepend=slack[0])))
         for part, slack in zip(
@@ -207,7 +207,7 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
     )
 
 
-def _beyond_floor(loops: Loops, stroke_starts: Ints) -> NDArray[np.bool_]:
+def beyond_floor(loops: Loops, stroke_starts: Ints) -> NDArray[np.bool_]:
     """Rows at the slack end of their stroke: none further contracted reads clearly more than the floor.
 
     A bin that holds pulling and slack readings is neither; and of few slack readings all may lie above it, so

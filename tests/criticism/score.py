@@ -34,7 +34,6 @@ from mpam_calib.specimen import read
 from mpam_calib.units import si_factor
 
 FIELDS = ["name", "group", "truth", "outside", "word", "named", "listed", "probability", "inside", "sized"]
-LISTED = 5
 HALVED, BENT = "-halved", "-bent"
 """What the name of a set ends in whose effects are halved, or bent."""
 NATS = 10.0
@@ -52,6 +51,7 @@ class Scored:
     word: str
     named: frozenset[str]
     listed: tuple[frozenset[str], ...]
+    """What ``diagnosis.json`` has as causes or alternatives."""
     probability: float
     inside: int = 0
     sized: int = 0
@@ -98,7 +98,8 @@ def score_case(recipe: recipes.Recipe, which: str = "") -> Scored:
     truth = frozenset(one.ids)
     named_right = bool(truth) and verdict.word == "named" and verdict.standing == truth
     inside, sized = _inside(found, truth, one) if named_right else (0, 0)
-    best = list(verdict.probabilities.items())[:LISTED]
+    told = {verdict.standing, *verdict.others()}
+    best = [(s, p) for s, p in verdict.probabilities.items() if s in told]
     return Scored(
         one.name, one.group, truth, one.outside is not None, verdict.word,
         verdict.standing, tuple(s for s, _ in best), best[0][1], inside, sized,
@@ -161,6 +162,7 @@ def rates(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
     clean = [s for s in scored if not s.outside]
     sep = [s for s in clean if s.truth and s.name in separable]
     other = [s for s in clean if s.truth and s.name not in separable]
+    seen = [s for s in other if s.word != "adequate"]
     null = [s for s in clean if not s.truth]
     outside = [s for s in scored if s.outside]
     return [
@@ -172,6 +174,11 @@ def rates(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
             "not separable: another set beats it for the oracle",
             sum(s.name in beaten for s in other),
             len(other),
+        ),
+        (
+            "not separable, not adequate: truth among the listed",
+            sum(s.truth in s.listed for s in seen),
+            len(seen),
         ),
         ("not separable: adequate", sum(s.word == "adequate" for s in other), len(other)),
         (

@@ -10,9 +10,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
+from mpam_calib.criticism.bursts import bursts_rms
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import Problem
-from mpam_calib.criticism.repeat import repeating_rms
+from mpam_calib.criticism.repeat import raw_residual, repeating_rms
 from mpam_calib.criticism.saturation import along_a_ceiling, saturated
 from mpam_calib.criticism.structure import structure_tests
 from mpam_calib.specimen import Specimen
@@ -32,6 +33,12 @@ def specimen() -> Specimen:
 def null(specimen: Specimen) -> tuple[Problem, Fit]:
     problem = problem_of(specimen)
     return problem, fit(problem, frozenset(), 0)
+
+
+def left(problem: Problem, fitted: Fit) -> Array:
+    """What a fit leaves of the raw readings, N."""
+    assert problem.rows is not None
+    return raw_residual(problem.rows, problem.blueprint.model_dump_json(), fitted)
 
 
 def test_p_values_are_spread_evenly_over_noise() -> None:
@@ -75,7 +82,7 @@ def test_noise_does_not_repeat(name: str) -> None:
     problem = problem_of(specimen_of(name))
     assert problem.rows is not None
     fitted = fit(problem, frozenset(), 0)
-    assert repeating_rms(problem.rows, problem.blueprint.model_dump_json(), fitted) == 0.0
+    assert repeating_rms(problem.rows, left(problem, fitted)) == 0.0
 
 
 def test_a_stroke_that_does_not_move_is_left_out(null: tuple[Problem, Fit]) -> None:
@@ -85,7 +92,7 @@ def test_a_stroke_that_does_not_move_is_left_out(null: tuple[Problem, Fit]) -> N
     stroke = np.unique(problem.rows.stroke)[2]
     x[problem.rows.stroke == stroke] = 0.001
     rows = replace(problem.rows, readings=replace(problem.rows.readings, displacement=x))
-    assert np.isfinite(repeating_rms(rows, problem.blueprint.model_dump_json(), fitted))
+    assert np.isfinite(repeating_rms(rows, left(replace(problem, rows=rows), fitted)))
 
 
 def test_a_ripple_of_the_drive_repeats(null: tuple[Problem, Fit]) -> None:
@@ -95,8 +102,7 @@ def test_a_ripple_of_the_drive_repeats(null: tuple[Problem, Fit]) -> None:
     x = problem.rows.readings.displacement
     size = problem.noise_level.total
     ripple = np.sqrt(2.0) * size * np.sin(2.0 * np.pi * 14.0 * x / x.max())
-    rows = replace(problem.rows, force=problem.rows.force + ripple)
-    found = repeating_rms(rows, problem.blueprint.model_dump_json(), fitted)
+    found = repeating_rms(problem.rows, left(problem, fitted) + ripple)
     assert found == pytest.approx(size, rel=0.35)
 
 
@@ -142,3 +148,47 @@ def test_readings_along_a_ceiling_are_left_out(specimen: Specimen) -> None:
     problem = problem_of(replace(specimen, loops=replace(loops, force_N=force)))
     assert problem.saturated == pytest.approx(0.1, abs=0.03)
     assert problem.force.max() < limit + noise
+
+
+def thinned(name: str, one_in: int) -> Specimen:
+    """The specimen with so many fewer readings."""
+    specimen = specimen_of(name)
+    assert specimen.loops is not None
+    left_out = np.arange(len(specimen.loops.force_N)) % one_in > 0
+    return replace(specimen, loops=specimen.loops.without(left_out))
+
+
+def in_bursts(problem: Problem, size: float, seed: int) -> tuple[Array, Array]:
+    """What a fit leaves, and with bursts of three to seven readings, of about the ``size`` (N)."""
+    assert problem.rows is not None
+    residual = left(problem, fit(problem, frozenset(), 0))
+    rng = np.random.default_rng(seed)
+    added = np.zeros(len(residual))
+    for start in rng.integers(0, len(added) - 8, size=max(6, len(added) // 200)):
+        added[start : start + int(rng.integers(3, 8))] += rng.choice([-1, 1]) * rng.uniform(0.5, 1.5) * size
+    return residual, residual + added
+
+
+@pytest.mark.parametrize("name", [*NULLS, "develop-null-004", "develop-null-010"])
+@pytest.mark.parametrize("one_in", [1, 3])
+def test_bursts_stand_out_of_short_and_long_strokes(name: str, one_in: int) -> None:
+    """Noise alone has none, near the floor neither; of large ones a third and more is seen."""
+    problem = problem_of(thinned(name, one_in))
+    assert problem.rows is not None
+    sd = np.ones(len(problem.rows.force))
+    for size, least in ((6.0, 0.0), (15.0, 0.3)):
+        quiet, loud = in_bursts(problem, size * problem.noise_level.total, 1)
+        assert bursts_rms(problem.rows, quiet, sd) == 0.0
+        added = float(np.sqrt(np.mean((loud - quiet) ** 2)))
+        assert least * added < bursts_rms(problem.rows, loud, sd) < 1.2 * added
+
+
+def test_what_comes_back_in_the_next_cycle_is_no_burst(null: tuple[Problem, Fit]) -> None:
+    """However sharp: fine structure that repeats is told by another test."""
+    problem, fitted = null
+    assert problem.rows is not None
+    x = problem.rows.readings.displacement
+    notch = -10.0 * problem.noise_level.total * np.exp(-0.5 * ((x / x.max() - 0.4) / 0.01) ** 2)
+    residual = left(problem, fitted) + notch
+    assert bursts_rms(problem.rows, residual, np.ones(len(x))) == 0.0
+    assert repeating_rms(problem.rows, residual) > 0.0

@@ -1,0 +1,86 @@
+"""Bursts and drop-outs: readings that stand out of their own stroke, where nothing is that fast.
+
+A muscle's force, and whatever is wrong with it, is smooth along a stroke away from its turns, and comes back
+in the next one. A loose plug does neither. Nor is it noise, whose means over a few readings keep to a normal
+distribution; it would only make the noise seem larger than it is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from mpam_calib.criticism.rows import Rows
+
+Array = NDArray[np.float64]
+
+FEWEST, READINGS_EACH, DEGREE = 10, 8, 6
+"""Readings of a stroke that is looked at, those to each degree of the curve taken out of it, most degrees."""
+TURNS = 0.05
+"""Share of a stroke next to each turn that is not looked at."""
+WIDTHS = (1, 3, 6)
+"""Consecutive readings that are looked at together."""
+OUTSTANDING = 6.0
+"""Standard deviations of such means beyond which readings are no noise: one in 5·10⁸."""
+SIZE = 0.2
+"""Root mean square of them all, in the noise's sd, below which they do not matter."""
+SD = 1.4826
+"""Standard deviation of normal noise in its median size."""
+
+
+def bursts_rms(rows: Rows, residual: Array, sd: Array) -> float:
+    """Root mean square (N, over all readings) of those in bursts; 0 where there are none that matter.
+
+    ``residual`` (rows,) is what a fit leaves, N; ``sd`` (rows,) is how the noise of a reading grows.
+    """
+    groups = _strokes(rows, residual / sd)
+    left = [piece for alike in groups for piece in alike]
+    if not left:
+        return 0.0
+    every = np.concatenate(left)
+    # What other strokes have at the same place, too, is no burst, however sharp.
+    own = [piece - usual for alike in groups for piece, usual in zip(alike, _of_others(alike), strict=True)]
+    stand_out = np.zeros(len(every), dtype=bool)
+    for width in WIDTHS:
+        here, beside = (np.concatenate([_mean(piece, width) for piece in kind]) for kind in (left, own))
+        least = OUTSTANDING * SD * np.median(np.abs(here))
+        high = (np.abs(here) > least) & (np.abs(beside) > least) & (here * beside > 0.0)
+        stand_out |= ndimage.maximum_filter1d(high, width)
+    share = float(np.sqrt(np.mean(np.where(stand_out, every, 0.0) ** 2)))
+    noise = SD * float(np.median(np.abs(every)))
+    return share * float(np.mean(sd)) if share > SIZE * noise else 0.0
+
+
+def _mean(piece: Array, width: int) -> Array:
+    """Means over some consecutive readings."""
+    return np.asarray(ndimage.uniform_filter1d(piece, width, mode="constant"))
+
+
+def _strokes(rows: Rows, residual: Array) -> list[list[Array]]:
+    """The residuals of each stroke without its turns, less a smooth curve, by level and branch."""
+    first = np.flatnonzero(np.diff(rows.stroke, prepend=-1))
+    groups: dict[tuple[int, float], list[Array]] = {}
+    for start, piece in zip(first, np.split(residual, first[1:]), strict=True):
+        margin = int(np.ceil(TURNS * len(piece)))
+        piece = piece[margin : len(piece) - margin]
+        if len(piece) >= FEWEST:
+            columns = legendre.legvander(
+                np.linspace(-1.0, 1.0, len(piece)), min(DEGREE, len(piece) // READINGS_EACH)
+            )
+            smooth = columns @ np.linalg.lstsq(columns, piece, rcond=None)[0]
+            alike = int(rows.readings.level[start]), float(rows.readings.sign[start])
+            groups.setdefault(alike, []).append(piece - smooth)
+    return list(groups.values())
+
+
+def _of_others(alike: list[Array]) -> list[Array]:
+    """For each stroke the median of the others at the same places; zeros where there are none."""
+    if len(alike) == 1:
+        return [np.zeros(len(alike[0]))]
+    places = [np.linspace(0.0, 1.0, len(piece)) for piece in alike]
+    grid = max(places, key=len)
+    table = np.array([np.interp(grid, at, piece) for at, piece in zip(places, alike, strict=True)])
+    medians = (np.median(np.delete(table, i, axis=0), axis=0) for i in range(len(alike)))
+    return [np.interp(at, grid, usual) for at, usual in zip(places, medians, strict=True)]
