@@ -116,7 +116,10 @@ def _left(content: dict[str, Any]) -> list[str]:
         found.append(f"a fine structure of {size} N comes back in every stroke at the same place")
     if content["bursts_N"] > 0.0:
         size = significant(content["bursts_N"])
-        found.append(f"bursts of {size} N (over all readings) stand out of their strokes: look at the plugs")
+        found.append(
+            f"bursts of {size} N (over all readings) stand out of their strokes: a loose plug? What cannot "
+            "be recorded again is calibrated with [noise] robust = true"
+        )
     if content["remainder_N"] > 0.0 or not found:
         size = significant(content["remainder_N"])
         found.append(f"structure of {size} N is left beside every set tried")
