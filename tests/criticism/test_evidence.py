@@ -213,16 +213,19 @@ def test_laplace_near_the_top_is_the_quadrature(name: str, monkeypatch: pytest.M
     assert np.sqrt(np.mean(second**2)) < np.sqrt(np.mean(first**2))
 
 
-def dense(hypothesis: Hypothesis, mode: Mode) -> float:
-    """Log evidence of one or two parameters on a grid of a fifth of a standard deviation.
+def dense(hypothesis: Hypothesis, mode: Mode, even: float = 8.0) -> float:
+    """Log evidence of one or two parameters on a grid of a fifth of a standard deviation, further out wider.
 
-    It reaches to eight of the prior's, which are one: a posterior can have a narrow top on wide skirts.
+    It reaches to eight of the prior's, which are one: a posterior can have a narrow top on wide skirts. Out
+    to ``even`` sds the spacing hardly grows, z = even sinh(t / even), from there on with the distance.
     """
     root, d = np.linalg.cholesky(mode.covariance), len(mode.u)
-    lines = [np.arange(-r, r, 0.2) for r in 8.0 / np.minimum(np.diag(root), 1.0)]
-    z = np.stack(np.meshgrid(*lines), axis=-1).reshape(-1, d)
-    log_p = evaluate(hypothesis, mode.u + z @ root.T)
-    return float(special.logsumexp(log_p) + d * np.log(0.2) + np.linalg.slogdet(root)[1])
+    reaches = even * np.arcsinh(8.0 / np.minimum(np.diag(root), 1.0) / even)
+    lines = [np.arange(-r, r, 0.2) for r in reaches]
+    t = np.stack(np.meshgrid(*lines), axis=-1).reshape(-1, d)
+    log_p = evaluate(hypothesis, mode.u + even * np.sinh(t / even) @ root.T)
+    spacing = np.log(0.2 * np.cosh(t / even)).sum(axis=1)
+    return float(special.logsumexp(log_p + spacing) + np.linalg.slogdet(root)[1])
 
 
 def inside(hypothesis: Hypothesis, mode: Mode) -> float:
