@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import islice
 from typing import Literal
 
 import numpy as np
@@ -23,7 +22,7 @@ STANDS = 20.0
 """The same for a cause beside structure that no set removes: odds of models that are known to be wrong."""
 LISTED = 5
 BESIDE = 10.0
-"""Nats below the likeliest set down to which others are told beside it: these data hardly separate them."""
+"""Nats below the likeliest set down to which these data hardly separate others from it."""
 NOISE_SIZE = 0.5
 """A remainder whose root mean square is below this share of a reading's noise is at its level."""
 REPEAT_SIZE = 0.2
@@ -49,10 +48,15 @@ class Verdict:
     bursts: float = 0.0
 
     def others(self) -> dict[Set, float]:
-        """Sets other than the standing one that come near the likeliest, with their probabilities."""
-        least = max(self.probabilities.values()) * np.exp(-BESIDE)
-        near = ((s, p) for s, p in self.probabilities.items() if s != self.standing and p >= least)
-        return dict(islice(near, 2 * LISTED))
+        """The five likeliest sets besides the standing one, and more of those that come near, to ten."""
+        others = [s for s in self.probabilities if s != self.standing]
+        return {s: self.probabilities[s] for s in others[: max(LISTED, min(self.near(), 2 * LISTED))]}
+
+    def near(self) -> int:
+        """How many sets, neither the standing one nor the likeliest, come within ``BESIDE`` nats of this."""
+        likeliest = next(iter(self.probabilities))
+        least = self.probabilities[likeliest] * np.exp(-BESIDE)
+        return sum(p >= least for s, p in self.probabilities.items() if s not in (self.standing, likeliest))
 
 
 def judge(found: Search) -> Verdict:

@@ -73,7 +73,7 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
         Section("Misfit budget", _budget(found, content)),
         Section("Where the misfit shows", _structure(content)),
         Section("Causes", _causes(causes)),
-        Section("What else could it be", _alternatives(content)),
+        Section("What else could it be", _alternatives(content, found.verdict.near())),
         Section("Gain on data the fit never saw", _gain(content)),
         Section("What these data cannot test", _not_tested(content)),
         Section("Simulation", [Text(wording.simulation_sentence(specimen.simulation))]),
@@ -211,9 +211,8 @@ def _meaning(identifier: str, form: str) -> str:
     return f"{item.sentence} ({'; '.join(words)})" if words else item.sentence
 
 
-def _alternatives(content: dict[str, Any]) -> list[Block]:
-    if not content["alternatives"]:
-        return [Text(f"No other set of causes comes within {BESIDE:g} nats of the likeliest.")]
+def _alternatives(content: dict[str, Any], near: int) -> list[Block]:
+    text = f"Sets within {BESIDE:g} nats of the likeliest, hardly told from it here: {near or 'none'}."
     rows = [
         {
             "set": ", ".join(a["ids"]) or "nothing beyond the declared simulation",
@@ -222,7 +221,7 @@ def _alternatives(content: dict[str, Any]) -> list[Block]:
         }
         for a in content["alternatives"]
     ]
-    return [DataTable(pd.DataFrame(rows), "Other sets of causes", {"probability": "{}"})]
+    return [Text(text), DataTable(pd.DataFrame(rows), "Other sets of causes", {"probability": "{}"})]
 
 
 def _telling(one: set[str], other: set[str]) -> str:

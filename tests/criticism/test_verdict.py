@@ -13,7 +13,7 @@ from mpam_calib.criticism.fit import fit
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.search import Search
 from mpam_calib.criticism.spread import Alone
-from mpam_calib.criticism.verdict import judge
+from mpam_calib.criticism.verdict import Verdict, judge
 
 CAUSE = frozenset(["length_offset"])
 NOTHING: frozenset[str] = frozenset()
@@ -79,3 +79,12 @@ def test_a_cause_stands_beside_unexplained_structure_only_by_far(
     assert found.score(CAUSE) - found.score(NOTHING) == pytest.approx(margin)
     verdict = judge(found)
     assert (verdict.word, verdict.standing) == ("unexplained", CAUSE if stands else NOTHING)
+
+
+@pytest.mark.parametrize(("margins", "listed", "near"), [(range(20, 31), 5, 0), (range(11), 10, 11)])
+def test_others_are_listed_however_far_behind(margins: range, listed: int, near: int) -> None:
+    """At least the five likeliest, and those that come near as far as the tenth."""
+    behind = {frozenset([f"effect_{m}"]): float(np.exp(-m)) for m in margins}
+    verdict = Verdict("named", CAUSE, CAUSE, {CAUSE: 1.0, **behind}, {}, 0)
+    assert list(verdict.others()) == list(behind)[:listed]
+    assert verdict.near() == near
