@@ -27,16 +27,18 @@ USUAL = 4.0
 FEWEST_PAIRS = 6
 """Pairs of repeated strokes that are enough to tell the noise from."""
 ALIKE = 20
-"""Strokes repeat each other where their numbers of rows differ by a row, or by one in so many."""
+"""Strokes repeat each other where their numbers of rows differ by a row, or by one in so many ..."""
+PACE = 0.1
+"""... and the logarithms of their time steps by no more than this: others are driven at another speed."""
 
 
 class Windows(NamedTuple):
-    """What the contrasts of windows see (k, dof), the windows' mean forces (k,), contrasts, time step (s)."""
+    """What the contrasts of windows see (k, dof), the windows' mean forces (k,) and time steps (k,), s."""
 
     chunks: Array
     force: Array
     contrast: Array
-    dt: float
+    dt: Array
 
     def usual(self, grows: bool) -> Windows:
         """Without bursts and snaps, which must not pass for noise.
@@ -44,16 +46,22 @@ class Windows(NamedTuple):
         They are far above the typical window, or above those of similar force where noise grows with it.
         """
         if grows:
-            kept = usual_chunks(self.chunks, self.force)
-            return self._replace(chunks=self.chunks[kept], force=self.force[kept])
+            return self._take(usual_chunks(self.chunks, self.force))
         power = np.mean(self.chunks**2, axis=1)
-        kept = power <= USUAL * np.median(power)
-        return self._replace(chunks=self.chunks[kept], force=self.force[kept])
+        return self._take(power <= USUAL * np.median(power))
 
-    @property
-    def scatter(self) -> tuple[Array, int, Array, float]:
-        """As the likelihood of fast noise takes it."""
-        return self.chunks.T @ self.chunks, len(self.chunks), self.contrast, self.dt
+    def paces(self) -> list[Windows]:
+        """The windows parted by their time step, which strokes at two speeds may have one each of."""
+        order = np.argsort(self.dt, kind="stable")
+        cuts = np.flatnonzero(np.diff(np.log(self.dt[order])) > PACE) + 1
+        return [self._take(some) for some in np.split(order, cuts)]
+
+    def _take(self, which: NDArray[np.bool_] | Ints) -> Windows:
+        return self._replace(chunks=self.chunks[which], force=self.force[which], dt=self.dt[which])
+
+    def scatter(self, dt: float) -> tuple[Array, int, Array, float]:
+        """As the likelihood of fast noise takes it, the readings ``dt`` (s) apart."""
+        return self.chunks.T @ self.chunks, len(self.chunks), self.contrast, dt
 
 
 def inside_strokes(loops: Loops, degree: int = DEGREE) -> Windows | None:
@@ -85,7 +93,7 @@ def _cut(loops: Loops, size: int, margin: int, degree: int) -> Windows | None:
     index = index[~loops.censored[index].any(axis=1)]
     if len(index) < 4:
         return None
-    dt = float(np.median((loops.time_s[index[:, -1]] - loops.time_s[index[:, 0]]) / (size - 1)))
+    dt = (loops.time_s[index[:, -1]] - loops.time_s[index[:, 0]]) / (size - 1)
     return _detrended(loops.force_N[index], loops.force_N[index].mean(axis=1), degree, dt)
 
 
@@ -110,32 +118,36 @@ def between_strokes(loops: Loops) -> Windows | None:
     starts = np.repeat(first[pairs], counts, axis=0) + (margins + within)[:, None]
     rows = starts[:, :, None] + np.arange(size)
     difference = (loops.force_N[rows[:, 0]] - loops.force_N[rows[:, 1]]) / np.sqrt(2.0)
-    dt = float(np.median((loops.time_s[rows[:, 0, -1]] - loops.time_s[rows[:, 0, 0]]) / (size - 1)))
+    dt = (loops.time_s[rows[:, 0, -1]] - loops.time_s[rows[:, 0, 0]]) / (size - 1)
     return _detrended(difference, loops.force_N[rows].mean(axis=(1, 2)), DEGREE, dt)
 
 
 def _repeated(loops: Loops) -> Ints:
-    """Pairs (k, 2) of strokes of one level and branch with about as many rows, each stroke in one at most."""
+    """Pairs (k, 2) of strokes of one level, branch and speed, each stroke in one at most."""
     first, length = loops.strokes
-    groups: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    step = (loops.time_s[first + length - 1] - loops.time_s[first]) / np.maximum(length - 1, 1)
+    groups: dict[tuple[int, int], list[tuple[int, float, int]]] = {}
     for stroke, (f, n) in enumerate(zip(first, length, strict=True)):
         if not loops.censored[f : f + n].any():
-            groups.setdefault((int(loops.level[f]), int(loops.branch[f])), []).append((int(n), stroke))
+            own = (int(n), float(np.log(max(step[stroke], 1e-9))), stroke)
+            groups.setdefault((int(loops.level[f]), int(loops.branch[f])), []).append(own)
     pairs: list[tuple[int, int]] = []
     for group in groups.values():
-        waiting: tuple[int, int] | None = None
-        for n, stroke in sorted(group):
-            if waiting is not None and n - waiting[0] <= max(1, n // ALIKE):
-                pairs.append((waiting[1], stroke))
-                waiting = None
+        waiting: list[tuple[int, float, int]] = []
+        for n, pace, stroke in sorted(group):
+            waiting = [w for w in waiting if n - w[0] <= max(1, n // ALIKE)]
+            other = next((w for w in waiting if abs(pace - w[1]) <= PACE), None)
+            if other is None:
+                waiting.append((n, pace, stroke))
             else:
-                waiting = n, stroke
+                waiting.remove(other)
+                pairs.append((other[2], stroke))
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
-def _detrended(windows: Array, force: Array, degree: int, dt: float) -> Windows:
-    """Windows (k, size) less a polynomial, with their mean forces (k,)."""
+def _detrended(windows: Array, force: Array, degree: int, dt: Array) -> Windows:
+    """Windows (k, size) less a polynomial, with their mean forces and time steps (k,)."""
     size = windows.shape[1]
     full, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, size), degree + 1), mode="complete")
     contrast = np.asarray(full[:, degree + 1 :], dtype=np.float64)
-    return Windows(windows @ contrast, force, contrast, max(dt, 1e-9))
+    return Windows(windows @ contrast, force, contrast, np.maximum(dt, 1e-9))

@@ -271,6 +271,8 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
             guess = model.setting.force_sd or _from_differences(bins.force, bins.segment)
             noise = NoiseLevel(guess, 0.0, 1.0)
         layout = StrokeCovariance.build(bins)
+        if noise.reading:
+            layout = replace(layout, dt=np.full_like(layout.dt, noise.reading))
         white, correlated, time = (np.array([v]) for v in (noise.white, noise.correlated, noise.time))
         padded = layout.matrix(white, correlated, time, np.zeros(1))[0][layout.kind]
         full = np.zeros((len(keep), len(keep)))

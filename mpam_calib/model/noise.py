@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 WHITE, CORRELATED, TIME = "noise_sd_N", "noise_corr_sd_N", "noise_corr_time_s"
 GROWTH, FREEDOM = "noise_growth", "noise_dof"
+SHORTEST = 2.0
+"""Readings that correlated noise lasts at the least: shorter it would be white."""
 
 
 def white_noise_parameter(setting: Setting) -> Parameter:
@@ -33,9 +35,9 @@ def correlated_noise_parameters(
 ) -> tuple[Parameter, ...]:
     """An Ornstein-Uhlenbeck part; its time constant lies between two readings and well below a stroke.
 
-    Shorter it would be white noise, longer it would be structure.
+    Longer it would be structure.
     """
-    shortest = 2.0 * reading_time
+    shortest = SHORTEST * reading_time
     median = 0.3 * (setting.force_sd or 0.003 * setting.force_scale)
     return (
         Parameter(CORRELATED, LogNormal(median, 1.0), "noise that lasts for a moment"),

@@ -101,14 +101,13 @@ def test_the_search_reaches_the_noise(name: str) -> None:
     found, windows = noise_level(specimen.loops, model), inside_strokes(specimen.loops)
     assert found is not None
     assert windows is not None
-    usual, priors = windows.usual(grows=False), {p.name: p.prior for p in model.parameters}
+    scatter = windows.usual(grows=False).scatter(float(np.median(windows.dt)))
+    priors = {p.name: p.prior for p in model.parameters}
 
     def log_posterior(*sizes: float) -> float:
         values = [np.array([v]) for v in sizes]
         u = [priors[n].to_normal(v)[0] for n, v in zip((WHITE, CORRELATED, TIME), values, strict=True)]
-        return float(fast_noise_log_likelihood(usual.scatter, 1, *values)[0]) - 0.5 * float(
-            np.square(u).sum()
-        )
+        return float(fast_noise_log_likelihood(scatter, 1, *values)[0]) - 0.5 * float(np.square(u).sum())
 
     assert log_posterior(found.white, found.correlated, found.time) >= log_posterior(*MADE)
     assert found.total == pytest.approx(np.hypot(*MADE[:2]), rel=0.1)

@@ -59,3 +59,35 @@ def _scatter(white: float, correlated: float, rows: float) -> float:
     """sd of the mean of ROWS readings, of which the noise is correlated for so many."""
     lag = np.abs(np.subtract.outer(np.arange(ROWS), np.arange(ROWS)))
     return float(np.sqrt(white**2 / ROWS + correlated**2 * np.exp(-lag / rows).mean()))
+
+
+@pytest.mark.parametrize("by_reading", [True, False])
+def test_noise_of_strokes_at_two_paces_is_told(by_reading: bool) -> None:
+    """As many rows for fast strokes as for slow ones: noise lasts for some readings there, or for some time.
+
+    A filter behind the export's thinning, z_i + z_{i-1}/2, counts readings; a cell that wavers does not.
+    """
+    specimen = specimen_of("develop-null-003")
+    loops = specimen.loops
+    assert loops is not None
+    time = np.cumsum(np.where(loops.level % 2 == 0, 0.05, 0.4))
+    loops = replace(loops, time_s=time, began_s=np.zeros(len(time)))
+    curve = 50.0 * (1.0 + loops.level) - 2e3 * loops.displacement_m + 2.0 * loops.branch
+    lasts, off = 1.0, []
+    for seed in range(4):
+        z = np.random.default_rng(seed).standard_normal(len(time) + 1)
+        if by_reading:
+            noise = z[1:] + 0.5 * z[:-1]
+            wanted = [np.sqrt(1.25 / ROWS + 2.0 * 0.5 * (ROWS - 1) / ROWS**2)] * 2
+        else:
+            keep = np.exp(-np.diff(time, prepend=time[0]) / lasts)
+            noise = np.empty(len(time))
+            for i, k in enumerate(keep):
+                noise[i] = z[i] if i == 0 else k * noise[i - 1] + np.sqrt(1.0 - k**2) * z[i]
+            wanted = [_scatter(0.0, 1.0, lasts / dt) for dt in (0.05, 0.4)]
+        found = problem_of(replace(specimen, loops=replace(loops, force_N=curve + 0.5 * noise))).noise_level
+        assert (found.reading > 0.0) == by_reading
+        for dt, scatter in zip((0.05, 0.4), wanted, strict=True):
+            rows = found.time / (found.reading or dt)
+            off.append(np.log(_scatter(found.white, found.correlated, rows) / (0.5 * scatter)))
+    assert np.max(np.abs(off)) < 0.3
