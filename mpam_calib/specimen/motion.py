@@ -17,6 +17,11 @@ NOISE_SDS = 10.0
 LEAVE_SDS = 7.0
 """A hold is over once the crosshead is this many standard deviations away from it."""
 
+FEWEST, USUAL = 8, 0.99
+"""Rows that tell a signal's noise, and the share of their differences that are no turns and jumps."""
+SHARP = 0.5
+"""Share of the noise that is left without turns where these were most of it: gentle ones are not."""
+
 SIDE = 4
 """Rows at least on either side of a turn that tell where it is."""
 WINDOW = 96
@@ -48,12 +53,26 @@ def noise_sd(values: Floats, order: int = 2) -> float:
     """Standard deviation of the white noise on a slowly moving signal, shape (rows,) (same unit).
 
     From differences of this order, in which motion cancels that is steady (order 2) or gently changing
-    (above); the largest hundredth (turns, jumps) is left out. 0 for fewer than eight rows.
+    (above); the largest hundredth (turns, jumps) is left out. Strokes of few rows turn more often: where
+    their turns are sharp, only differences that span none are asked. 0 for fewer than eight rows.
     """
-    if len(values) < 8:
+    if len(values) < FEWEST:
         return 0.0
-    square = np.diff(values, n=order) ** 2
-    kept = square[square <= np.quantile(square, 0.99)]
+    differences = np.diff(values, n=order)
+    sd = _sd_of(differences, order)
+    turns = turning_points(values, max(RANGE_SHARE * float(np.ptp(values)), NOISE_SDS * sd))[1:-1]
+    if len(turns) * (order - 1) <= (1.0 - USUAL) * len(differences):
+        return sd
+    spans = np.zeros(len(differences), dtype=bool)
+    for back in range(1, order):
+        spans[np.clip(turns - back, 0, len(spans) - 1)] = True
+    steady = _sd_of(differences[~spans], order) if np.sum(~spans) >= FEWEST else sd
+    return steady if steady < SHARP * sd else sd
+
+
+def _sd_of(differences: Floats, order: int) -> float:
+    square = differences**2
+    kept = square[square <= np.quantile(square, USUAL)]
     return float(np.sqrt(kept.mean() / comb(2 * order, order))) if len(kept) else 0.0
 
 

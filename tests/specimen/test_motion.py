@@ -87,6 +87,19 @@ def test_strokes_of_different_speeds_meet_at_their_turn(gentle: bool, ratio: flo
     assert np.mean(wrong) / 5 < 0.05
 
 
+@pytest.mark.parametrize("sd", [0.0, 0.002])
+@pytest.mark.parametrize("rows", [5, 9, 14])
+def test_sharp_turns_of_strokes_of_few_rows(rows: int, sd: float) -> None:
+    """A reading at each turn: one row in nine turns, which is no noise. ``sd`` in strokes."""
+    way = np.arange(1, rows + 1) / rows
+    x = np.tile(np.concatenate([way, 1.0 - way]), 12)
+    x = x + sd * np.random.default_rng(1).standard_normal(len(x))
+    truth = np.tile(np.repeat([-1, 1], rows), 12)
+    found = read_motion(x, turn_threshold(x), noise_sd(x))
+    assert (found.branch == truth)[~found.unclear].all()
+    assert found.unclear.sum() <= 24
+
+
 @pytest.mark.parametrize("rows", [15, 40, 100, 400])
 @pytest.mark.parametrize("ratio", [1.0, 5.0])
 @pytest.mark.parametrize("gentle", [False, True])
