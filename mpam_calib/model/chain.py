@@ -24,7 +24,7 @@ from mpam_calib.model.readings import Readings
 from mpam_calib.model.reference import rest_of
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.friction import coulomb_factor, strand_friction_per_f_s
-from mpam_calib.physics.kinematics import SHAPES, Shape, swollen
+from mpam_calib.physics.kinematics import SHAPES, swollen
 from mpam_calib.physics.statics import gas_force, modulus_columns, thickness_force
 
 Array = NDArray[np.float64]
@@ -144,8 +144,8 @@ class Chain:
 
     def unsigned(self, values: Values, readings: Readings, guide: Array | None = None) -> Unsigned:
         """:meth:`factored` but for the pull's signs: alike for all guides without :attr:`uses_force`."""
-        state, shape = self._to_shape(values, readings, np.zeros(len(readings)) if guide is None else guide)
-        fixed, columns = self._statics(state, shape, values)
+        state = self._to_shape(values, readings, np.zeros(len(readings)) if guide is None else guide)
+        fixed, columns = self._statics(state, values)
         state = self._to_sensor(state, values)
         return Unsigned(fixed, columns, self._friction_beside(state) + state.zero, state)
 
@@ -170,15 +170,15 @@ class Chain:
 
     def _force_given(self, guide: Array, values: Values, eta: Array, readings: Readings) -> Array:
         """Force (B, n), N, where what depends on the force is fed with a guide (B or 1, n)."""
-        state, shape = self._to_shape(values, readings, guide)
-        fixed, columns = self._statics(state, shape, values)
+        state = self._to_shape(values, readings, guide)
+        fixed, columns = self._statics(state, values)
         free = fixed + np.einsum("...np,...p->...n", columns, eta) if columns.shape[-1] else fixed
         state = self._to_sensor(state, values)
         free = state.gain * free
         friction = state.friction_gain * state.coulomb * np.abs(free) * state.sign
         return np.asarray(free + friction + self._friction_beside(state) + state.zero)
 
-    def _to_shape(self, values: Values, readings: Readings, guide: Array) -> tuple[State, Shape]:
+    def _to_shape(self, values: Values, readings: Readings, guide: Array) -> State:
         state = self.start(readings, guide)
         if self.with_nuisances:
             state = apply_nuisances(state, values)
@@ -187,11 +187,12 @@ class Chain:
         state = self._stage(Stage.SHAPE, state, values)
         length = np.maximum(state.length, 0.05 * state.rest.L0)
         shape = swollen(SHAPES[state.kinematics](length, state.rest), state.rest, state.swell)
-        return replace(state, shape=shape), shape
+        return replace(state, shape=shape)
 
-    def _statics(self, state: State, shape: Shape, values: Values) -> tuple[Array, Array]:
+    def _statics(self, state: State, values: Values) -> tuple[Array, Array]:
         state = self._stage(Stage.STATICS, state, values)
-        P = state.pressure
+        P, shape = state.pressure, state.shape
+        assert shape is not None
         fixed = gas_force(P, shape) + state.wall_factor * thickness_force(P, shape) - state.lost
         if self.moduli is None:
             return fixed, np.zeros((*fixed.shape, 0))

@@ -90,6 +90,21 @@ def swollen(shape: Shape, rest: Rest, factor: Array) -> Shape:
     return Shape(shape.L, R, wall_at_constant_volume(shape.L, R, rest), shape.T)
 
 
+def with_longer_strands(shape: Shape, rest: Rest, kinematics: str, strain: Array) -> Shape:
+    """A shape whose strands are longer by a share ``strain``: sin α = L/(B (1 + ε)) (Eq. 2.1, 4.15).
+
+    Where the braid sets the radius, 2πN R = √(B² (1 + ε)² − L²) (Eq. 2.10) in place of √(B² − L²).
+    """
+    sin2 = sin_braid_angle(shape.L, rest) ** 2
+    longer = (1.0 + strain) ** 2
+    T = np.minimum(sin2, SIN_LIMIT**2 * longer)
+    T = T / (longer - T)
+    if kinematics != "inextensible_braid":
+        return Shape(shape.L, shape.R, shape.t, T)
+    R = shape.R * np.sqrt(np.maximum(longer - sin2, 0.0) / (1.0 - sin2))
+    return Shape(shape.L, R, wall_at_constant_volume(shape.L, R, rest), T)
+
+
 def tip_shortened_length(L: Array, R: Array, rest: Rest, factor: Array) -> Array:
     """Working length (m) with rounded tips: L′ = L − 2·factor·(π/2 − 1)(R − R0) (thesis Eq. 2.46-2.47)."""
     return L - 2.0 * factor * (np.pi / 2.0 - 1.0) * (R - rest.R0)

@@ -68,3 +68,10 @@ def braid_energy_force(P: Array, L: Array, rest: Rest, E_br: float, R_br: float,
     turns = B * np.cos(rest.alpha0) / rest.R0
     area = np.pi * R_br**2
     return L / (E_br * area * n) * 4.0 * np.pi**2 * P**2 * B**3 / turns**4
+
+
+def strand_strain(P: Array, L: Array, rest: Rest, E_br: float, R_br: float, n: int) -> Array:
+    """Strain of a strand under the tension 2πPBL/(n (2πN)²), whose energy is that of thesis Eq. 2.25."""
+    B = rest.L0 / np.sin(rest.alpha0)
+    turns = B * np.cos(rest.alpha0) / rest.R0
+    return 2.0 * np.pi * P * B * L / (n * turns**2) / (E_br * np.pi * R_br**2)

@@ -20,6 +20,7 @@ from mpam_calib.physics.kinematics import (
     tip_shortened_length,
     tip_shortened_length_of_its_own,
     wall_at_constant_volume,
+    with_longer_strands,
 )
 from mpam_calib.physics.statics import (
     axial_lever,
@@ -28,6 +29,7 @@ from mpam_calib.physics.statics import (
     hoop_lever,
     modulus_columns,
     strains,
+    strand_strain,
     thickness_force,
 )
 
@@ -113,6 +115,41 @@ def test_the_strands_keep_their_length(m, gamma):
     assert (turns * R) ** 2 + L**2 == pytest.approx(B**2, rel=1e-12)
     T = float(tan2_braid_angle(np.asarray(L), rest))
     assert 1.0 / math.sqrt(1.0 + T) == pytest.approx(turns * R / B, rel=1e-10)
+
+
+@cheap
+@given(tubes(), GAMMA, st.floats(0.0, 0.05))
+def test_longer_strands_keep_their_turns(m, gamma, strain):
+    """(2πNR)² + L² = B² (1 + ε)² with N as at rest, cos α = 2πNR/(B (1 + ε)), and the wall its volume."""
+    rest, L = rest_of(m), np.asarray(m.L0 * (1.0 - gamma))
+    shape = with_longer_strands(
+        SHAPES["inextensible_braid"](L, rest), rest, "inextensible_braid", np.asarray(strain)
+    )
+    B = m.L0 / math.sin(m.alpha0) * (1.0 + strain)
+    turns = m.L0 / math.tan(m.alpha0) / m.R0
+    assert (turns * shape.R) ** 2 + L**2 == pytest.approx(B**2, rel=1e-9)
+    assert 1.0 / math.sqrt(1.0 + shape.T) == pytest.approx(float(turns * shape.R / B), rel=1e-8)
+    assert float(shape.t) == pytest.approx(float(wall_at_constant_volume(L, shape.R, rest)), rel=1e-12)
+    wall = with_longer_strands(
+        SHAPES["constant_thickness"](L, rest), rest, "constant_thickness", np.asarray(strain)
+    )
+    assert wall.R == SHAPES["constant_thickness"](L, rest).R
+    assert float(wall.T) == pytest.approx(float(shape.T), rel=1e-9)
+
+
+@cheap
+@given(tubes(), GAMMA, PRESSURE)
+def test_the_energy_of_stretched_strands_is_that_of_2_25(m, gamma, P):
+    """U = ½ E A B ε² n; its slope along the length is the force that Eq. 2.25 subtracts."""
+    rest, L, E, r, n = rest_of(m), m.L0 * (1.0 - gamma), 2.1e9, 1e-4, 48
+    B = m.L0 / math.sin(m.alpha0)
+
+    def energy(length):
+        return 0.5 * E * math.pi * r**2 * B * n * strand_strain(P, length, rest, E, r, n) ** 2
+
+    step = 1e-4 * L
+    slope = (energy(L + step) - energy(L - step)) / (2.0 * step)
+    assert slope == pytest.approx(float(braid_energy_force(P, L, rest, E, r, n)), rel=1e-6)
 
 
 @cheap

@@ -8,7 +8,8 @@ from mpam_calib.model.curves import middle_pressure, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import HalfLongTailed, LogNormal, Parameter
 from mpam_calib.model.state import Setting, State
-from mpam_calib.physics.statics import braid_energy_force
+from mpam_calib.physics.kinematics import with_longer_strands
+from mpam_calib.physics.statics import braid_energy_force, strand_strain
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -28,6 +29,16 @@ def _power(state: State, values: Values, setting: Setting) -> State:
     return _apply(state, {**values, "braid_factor": values["braid_factor"] * part}, setting)
 
 
+def _longer(state: State, values: Values, setting: Setting) -> State:
+    """Strands that are longer under tension let the muscle grow thicker, at a flatter angle."""
+    braid = setting.braid
+    assert braid is not None
+    assert state.shape is not None
+    strain = strand_strain(state.pressure, state.length, state.rest, braid.E_br, braid.R_br, braid.n)
+    strain = values["braid_factor"] * strain
+    return replace(state, shape=with_longer_strands(state.shape, state.rest, state.kinematics, strain))
+
+
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("braid_exponent", LogNormal(1.7, 0.3), "power of the pressure lost", "textbook", ""),)
 
@@ -44,10 +55,11 @@ register(
         apply=_apply,
         memory=False,
         needs_braid=True,
-        forms={"power": _power},
+        forms={"power": _power, "longer": _longer},
         own={"power": _exponent},
         sources={
-            "power": "textbook: energy in strands whose stiffness grows with tension, ∝ P^m (linear: 2)"
+            "power": "textbook: energy in strands whose stiffness grows with tension, ∝ P^m (linear: 2)",
+            "longer": "textbook: Hooke's law of a strand, whose length then sets angle and radius",
         },
         bends={"contraction": 1, "pressure": 2},
         looseness=2.0,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mpam_calib.model.curves import half_test, settled
+from mpam_calib.model.curves import half_test, middle_pressure, power, settled
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -39,6 +39,16 @@ def _slip_time(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("slip_s", prior, "time in which the grips settle"),)
 
 
+def _seating(state: State, values: Values, setting: Setting) -> State:
+    """The end fittings seat themselves under pressure: the offset is off by a power of it."""
+    part = power(state.pressure / middle_pressure(setting), values["offset_exponent"])
+    return replace(state, displacement=state.displacement + values["offset_mm"] * part)
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("offset_exponent", Normal(0.0, 0.5), "power of the pressure", "textbook", ""),)
+
+
 def _settling(state: State, values: Values, setting: Setting) -> State:
     """There from the start, and more or less of it at first, until a fifth of the test has passed."""
     fading = np.exp(-state.readings.time / (0.4 * half_test(setting)))
@@ -61,13 +71,14 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"scale": _scale, "slip": _slip, "settling": _settling},
-        own={"slip": _slip_time, "settling": _excess},
+        forms={"scale": _scale, "slip": _slip, "settling": _settling, "seating": _seating},
+        own={"slip": _slip_time, "settling": _excess, "seating": _exponent},
         recalls=("slip", "settling"),
         sources={
             "scale": "textbook: gain error of a displacement sensor",
             "slip": "textbook: first-order settling of a clamp, 1 − exp(−t/τ)",
             "settling": "textbook: an offset with an exponential transient, 1 + c·exp(−t/τ)",
+            "seating": "textbook: end fittings that seat under pressure, δ·(P/P_middle)^m",
         },
         bends={"contraction": 1, "settling": 3},
     )
