@@ -12,7 +12,8 @@ from scipy import linalg
 
 from mpam_calib.criticism.fit import Fit
 from mpam_calib.criticism.problem import SIZES, Problem
-from mpam_calib.criticism.search import Search, Set
+from mpam_calib.criticism.refits import Set
+from mpam_calib.criticism.search import Search
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,8 @@ from mpam_calib.criticism.budget import Budget, misfit_budget
 from mpam_calib.criticism.candidates import Candidates, candidates
 from mpam_calib.criticism.gain import Gain, measure_gain
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
-from mpam_calib.criticism.search import LARGEST, Search, Set, search
+from mpam_calib.criticism.refits import Set
+from mpam_calib.criticism.search import LARGEST, Search, search
 from mpam_calib.criticism.structure import Structure, structure_tests
 from mpam_calib.criticism.verdict import Verdict, judge
 from mpam_calib.errors import InputError

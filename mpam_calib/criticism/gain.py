@@ -19,7 +19,8 @@ from mpam_calib.criticism.candidates import HISTORY
 from mpam_calib.criticism.climb import STEP
 from mpam_calib.criticism.fit import Fit, chain_for, doubt_columns
 from mpam_calib.criticism.problem import SIZES, Problem
-from mpam_calib.criticism.search import Search, Set, causes_of, search
+from mpam_calib.criticism.refits import Set, causes_of
+from mpam_calib.criticism.search import Search, search
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.model.blueprint import Blueprint
 

@@ -8,29 +8,33 @@ as the average catalogue has it: a set of k out of n effects has prior ∝ RATE^
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import combinations
 from math import comb, log
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
-from mpam_calib.criticism.doubt import DOUBTS
-from mpam_calib.criticism.fit import Fit, fit
-from mpam_calib.criticism.forms import flexible, forms_of, price
+from mpam_calib.criticism.fit import Fit
+from mpam_calib.criticism.forms import flexible
 from mpam_calib.criticism.noise_scale import noise_scale
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
-from mpam_calib.criticism.spread import Alone, Spread, held_problem, spread_over
+from mpam_calib.criticism.refits import (
+    Set,
+    Try,
+    best_of,
+    causes_of,
+    ended,
+    named_forms,
+    with_better_forms,
+    with_doubt,
+)
+from mpam_calib.criticism.spread import Alone, Spread, spread_over
 from mpam_calib.model.bend import is_bend
 from mpam_calib.model.effect import effect
 
 Array = NDArray[np.float64]
-Set = frozenset[str]
-Try = tuple[tuple[str, ...], dict[str, float]]
-"""Forms of the effects, and coordinates to start from."""
 
 RATE = 0.001
 """Prior odds of one more cause: a passenger must not come close to the set that it rides on."""
@@ -41,8 +45,10 @@ LEADING_SHARE = 3
 PARTNERS = 8
 """Best single effects that are tried as partners of every kept set."""
 LARGEST = 3
-CARRIED = 40
+CARRIED = 60
 """Leading sets that go on once the noise is settled."""
+NEAR, POLISHED = 25.0, 40
+"""Nats behind the best within which sets are tried in all their forms, and how many of these at most."""
 LEADERS = 5
 """Sets whose parts and forms are looked at once more."""
 DOUBTED, DOUBTED_EACH = 12, 4
@@ -86,7 +92,7 @@ class Search:
             return self.refit(effects, size)
         key = (effects, size)
         if key not in self.searched:
-            (best,) = self.spread(_best_of, [(size, self._tries(effects, size), False)])
+            (best,) = self.spread(best_of, [(size, self._tries(effects, size), False)])
             if best is None:
                 raise np.linalg.LinAlgError(f"no fit of {sorted(effects)}")
             self.searched[key] = best
@@ -96,16 +102,16 @@ class Search:
         """Refit many sets, each beside a remainder of one size; those that no climb can fit are left out."""
         todo = [key for key in dict.fromkeys(keys) if key not in self.fits]
         tasks = [(size, self._tries(effects, size), self.doubting) for effects, size in todo]
-        for key, found in zip(todo, self.spread(_best_of, tasks, chunk=4), strict=True):
+        for key, found in zip(todo, self.spread(best_of, tasks, chunk=4), strict=True):
             if found is not None:
                 self.fits[key] = found
 
     def refit_like(self, known: Fit) -> None:
         """Refit a set beside every remainder in the forms, and from the end, of another fit of it, too."""
         effects = causes_of(known)
-        tries = [(tuple(sorted(known.effects)), _ended(known))]
+        tries = [(tuple(sorted(known.effects)), ended(known))]
         for size in range(len(SIZES)):
-            (found,) = self.spread(_best_of, [(size, tries, self.doubting)])
+            (found,) = self.spread(best_of, [(size, tries, self.doubting)])
             seen = self.fits.get((effects, size))
             if found is not None and (seen is None or found.log_evidence > seen.log_evidence):
                 self.fits[effects, size] = found
@@ -120,7 +126,7 @@ class Search:
             starts = [{}, *(dict.fromkeys(names, value) for value in STARTS if names)]
             return [((form,), start) for e in effects for form in flexible(e) for start in starts]
         if near is not None:
-            return [(tuple(sorted(near.effects)), _ended(near))]
+            return [(tuple(sorted(near.effects)), ended(near))]
         # From where the best part ended, and from nothing: a part may have ended in a shape that only
         # made up for what it lacked.
         choice, start = self._from_parts(effects, size)
@@ -145,9 +151,9 @@ class Search:
         (new,) = effects - part
         own = self._known(frozenset([new]), size)
         assert base is not None
-        forms = _forms(base) | ({new: flexible(new)[0]} if own is None else _forms(own))
-        start = {} if own is None else {n: u for n, u in _ended(own).items() if not is_bend(n)}
-        return forms, start | _ended(base)
+        forms = named_forms(base) | ({new: flexible(new)[0]} if own is None else named_forms(own))
+        start = {} if own is None else {n: u for n, u in ended(own).items() if not is_bend(n)}
+        return forms, start | ended(base)
 
     def _known(self, effects: Set, size: int) -> Fit | None:
         """The set's fit beside a remainder of this size, or of the size that suits it best."""
@@ -160,7 +166,13 @@ class Search:
         """Change one form of a set at a time, as long as that helps."""
         todo = [k for k in dict.fromkeys(keys) if k in self.fits and k not in self.polished]
         self.polished.update(todo)
-        self.fits.update(zip(todo, self.spread(_polished, [self.fits[key] for key in todo]), strict=True))
+        better = self.spread(with_better_forms, [self.fits[key] for key in todo])
+        self.fits.update(zip(todo, better, strict=True))
+
+    def polish_near(self) -> None:
+        """Polish all that may yet lead: in the bent forms of the search a true set may trail some nats."""
+        near = [s for s in self.sets[:POLISHED] if self.score(s) > self.score(self.sets[0]) - NEAR]
+        self.polish_all((s, self.best_size(s)) for s in near)
 
     def doubt(self) -> None:
         """Refit the leading sets, and the best of each number of effects, with a doubt about their forms."""
@@ -171,7 +183,7 @@ class Search:
         }
         chosen |= {frozenset(p) for s in sets[:LEADERS] for p in combinations(sorted(s), max(len(s) - 1, 0))}
         keys = [key for key in self.fits if key[0] in chosen]
-        doubted = self.spread(_doubted, [self.fits[key] for key in keys], chunk=2)
+        doubted = self.spread(with_doubt, [self.fits[key] for key in keys], chunk=2)
         # A doubt has its price in evidence: who does not pay it cannot be compared with those who do.
         self.searched, self.fits = self.fits, dict(zip(keys, doubted, strict=True))
         self.doubting = True
@@ -183,8 +195,8 @@ class Search:
         made = Search(problem, self.tested, spread, seen=self.seen | {effects for effects, _ in self.fits})
         keys = [key for key in self.fits if key[0] in kept]
         fits = (self.fits[key] for key in keys)
-        tasks = [(f.size, [(tuple(sorted(f.effects)), _ended(f))], False) for f in fits]
-        for key, found in zip(keys, spread(_best_of, tasks, chunk=4), strict=True):
+        tasks = [(f.size, [(tuple(sorted(f.effects)), ended(f))], False) for f in fits]
+        for key, found in zip(keys, spread(best_of, tasks, chunk=4), strict=True):
             if found is not None:
                 made.fits[key] = found
         return made
@@ -212,21 +224,6 @@ class Search:
     def sets(self) -> list[Set]:
         """All sets seen, best first."""
         return sorted({key[0] for key in self.fits}, key=lambda s: -self.score(s))
-
-
-def causes_of(found: Fit) -> Set:
-    """The effects of a fit, whatever their forms."""
-    return frozenset(_forms(found))
-
-
-def _forms(found: Fit) -> dict[str, str]:
-    """The form of each effect of a fit."""
-    return {e.partition(":")[0]: e for e in found.effects}
-
-
-def _ended(found: Fit) -> dict[str, float]:
-    """Where a fit ended."""
-    return dict(zip(found.names, found.u.tolist(), strict=True))
 
 
 def search(
@@ -286,10 +283,12 @@ def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
         for size in every:
             found.refit_all((effects, size) for effects in kept)
         _polish(found, kept)
+    found.polish_near()
 
 
 def _finish(found: Search, tell: Callable[[float], None]) -> None:
     """The leaders' neighbours and parts, and a doubt about the forms of all that lead."""
+    found.polish_near()
     for turn in range(2):
         tell(0.85 + 0.07 * turn)
         # One cause of the best set may stand in for another that no kept set led to.
@@ -302,49 +301,6 @@ def _finish(found: Search, tell: Callable[[float], None]) -> None:
             found.refit_all((effects, size) for effects in [*parts, *leaders])
         _polish(found, [*parts, *leaders])
     found.doubt()
-
-
-def _best_of(task: tuple[int, list[Try], bool]) -> Fit | None:
-    """The best of some climbs."""
-    size, tries, doubting = task
-    best: Fit | None = None
-    for forms, start in tries:
-        best = _better(best, forms, size, start)
-    return _doubted(best) if best is not None and doubting else best
-
-
-def _doubted(found: Fit) -> Fit:
-    """The fit with a doubt about the forms of its effects; as it is where that cannot be climbed."""
-    again = _better(None, tuple(sorted(found.effects)), found.size, _ended(found), DOUBTS)
-    return found if again is None else again
-
-
-def _polished(found: Fit) -> Fit:
-    """The fit with its forms changed one at a time."""
-    best = found
-    for e in sorted(_forms(found)):
-        for form in forms_of(e):
-            chosen = _forms(best) | {e: form}
-            best = _better(best, tuple(chosen.values()), found.size, _ended(best)) or best
-    return best
-
-
-def _better(
-    best: Fit | None,
-    forms: tuple[str, ...],
-    size: int,
-    start: dict[str, float],
-    doubts: tuple[float, ...] = (),
-) -> Fit | None:
-    try:
-        with warnings.catch_warnings():
-            # On its way a climb may pass through shapes that no muscle has.
-            warnings.simplefilter("ignore", linalg.LinAlgWarning)
-            found = fit(held_problem(), frozenset(forms), size, start, doubts=doubts)
-    except np.linalg.LinAlgError:
-        return best
-    found = replace(found, log_evidence=found.log_evidence - sum(map(price, forms)))
-    return found if best is None or found.log_evidence > best.log_evidence else best
 
 
 def _polish(found: Search, sets: Iterable[Set]) -> None:

@@ -10,8 +10,9 @@ import numpy as np
 from mpam_calib.criticism.budget import remainder_rms, structured
 from mpam_calib.criticism.bursts import bursts_rms
 from mpam_calib.criticism.problem import SIZES
+from mpam_calib.criticism.refits import Set
 from mpam_calib.criticism.repeat import raw_residual, repeating_rms
-from mpam_calib.criticism.search import Search, Set
+from mpam_calib.criticism.search import Search
 from mpam_calib.model.noise import grown
 
 Word = Literal["adequate", "named", "ambiguous", "unexplained"]

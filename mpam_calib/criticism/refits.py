@@ -1,0 +1,79 @@
+"""One set's refit: climbs from several starts, other forms of its effects, a doubt about these.
+
+These are the tasks of a search's workers, which hold the problem.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+from scipy import linalg
+
+from mpam_calib.criticism.doubt import DOUBTS
+from mpam_calib.criticism.fit import Fit, fit
+from mpam_calib.criticism.forms import forms_of, price
+from mpam_calib.criticism.spread import held_problem
+
+Set = frozenset[str]
+Try = tuple[tuple[str, ...], dict[str, float]]
+"""Forms of the effects, and coordinates to start from."""
+
+
+def causes_of(found: Fit) -> Set:
+    """The effects of a fit, whatever their forms."""
+    return frozenset(named_forms(found))
+
+
+def named_forms(found: Fit) -> dict[str, str]:
+    """The form of each effect of a fit."""
+    return {e.partition(":")[0]: e for e in found.effects}
+
+
+def ended(found: Fit) -> dict[str, float]:
+    """Where a fit ended."""
+    return dict(zip(found.names, found.u.tolist(), strict=True))
+
+
+def best_of(task: tuple[int, list[Try], bool]) -> Fit | None:
+    """The best of some climbs."""
+    size, tries, doubting = task
+    best: Fit | None = None
+    for forms, start in tries:
+        best = _better(best, forms, size, start)
+    return with_doubt(best) if best is not None and doubting else best
+
+
+def with_doubt(found: Fit) -> Fit:
+    """The fit with a doubt about the forms of its effects; as it is where that cannot be climbed."""
+    again = _better(None, tuple(sorted(found.effects)), found.size, ended(found), DOUBTS)
+    return found if again is None else again
+
+
+def with_better_forms(found: Fit) -> Fit:
+    """The fit with its forms changed one at a time."""
+    best = found
+    for e in sorted(named_forms(found)):
+        for form in forms_of(e):
+            chosen = named_forms(best) | {e: form}
+            best = _better(best, tuple(chosen.values()), found.size, ended(best)) or best
+    return best
+
+
+def _better(
+    best: Fit | None,
+    forms: tuple[str, ...],
+    size: int,
+    start: dict[str, float],
+    doubts: tuple[float, ...] = (),
+) -> Fit | None:
+    try:
+        with warnings.catch_warnings():
+            # On its way a climb may pass through shapes that no muscle has.
+            warnings.simplefilter("ignore", linalg.LinAlgWarning)
+            found = fit(held_problem(), frozenset(forms), size, start, doubts=doubts)
+    except np.linalg.LinAlgError:
+        return best
+    found = replace(found, log_evidence=found.log_evidence - sum(map(price, forms)))
+    return found if best is None or found.log_evidence > best.log_evidence else best
