@@ -7,6 +7,9 @@ distribution; it would only make the noise seem larger than it is.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import pairwise
+
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
@@ -60,19 +63,24 @@ def _mean(piece: Array, width: int) -> Array:
 
 def _strokes(rows: Rows, residual: Array) -> list[list[Array]]:
     """The residuals of each stroke without its turns, less a smooth curve, by level and branch."""
-    first = np.flatnonzero(np.diff(rows.stroke, prepend=-1))
     groups: dict[tuple[int, float], list[Array]] = {}
-    for start, piece in zip(first, np.split(residual, first[1:]), strict=True):
-        margin = int(np.ceil(TURNS * len(piece)))
-        piece = piece[margin : len(piece) - margin]
-        if len(piece) >= FEWEST:
-            columns = legendre.legvander(
-                np.linspace(-1.0, 1.0, len(piece)), min(DEGREE, len(piece) // READINGS_EACH)
-            )
-            smooth = columns @ np.linalg.lstsq(columns, piece, rcond=None)[0]
-            alike = int(rows.readings.level[start]), float(rows.readings.sign[start])
-            groups.setdefault(alike, []).append(piece - smooth)
+    for here, piece in detrended(rows, residual):
+        alike = int(rows.readings.level[here.start]), float(rows.readings.sign[here.start])
+        groups.setdefault(alike, []).append(piece)
     return list(groups.values())
+
+
+def detrended(rows: Rows, residual: Array) -> Iterator[tuple[slice, Array]]:
+    """Each stroke without its turns: its place among the readings, and its residuals less a smooth curve."""
+    first = np.flatnonzero(np.diff(rows.stroke, prepend=-1))
+    for start, stop in pairwise([*first.tolist(), len(residual)]):
+        margin = int(np.ceil(TURNS * (stop - start)))
+        here = slice(start + margin, stop - margin)
+        piece = residual[here]
+        if len(piece) >= FEWEST:
+            degree = min(DEGREE, len(piece) // READINGS_EACH)
+            columns = legendre.legvander(np.linspace(-1.0, 1.0, len(piece)), degree)
+            yield here, piece - columns @ np.linalg.lstsq(columns, piece, rcond=None)[0]
 
 
 def _of_others(alike: list[Array]) -> list[Array]:

@@ -114,6 +114,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "saturated_share": _round(diagnosis.problem.saturated),
         "repeating_N": _round(verdict.repeating),
         "bursts_N": _round(verdict.bursts),
+        "hum_N": _round(verdict.hum),
         "searched": {
             "sets": len(diagnosis.search.seen | {effects for effects, _ in diagnosis.search.searched}),
             "largest": LARGEST,

@@ -9,6 +9,7 @@ import numpy as np
 
 from mpam_calib.criticism.budget import remainder_rms, structured
 from mpam_calib.criticism.bursts import bursts_rms
+from mpam_calib.criticism.hum import hum_rms
 from mpam_calib.criticism.problem import SIZES
 from mpam_calib.criticism.refits import Set
 from mpam_calib.criticism.repeat import raw_residual, repeating_rms
@@ -36,7 +37,7 @@ class Verdict:
 
     ``standing`` are the causes that hold even beside a remainder; ``size`` indexes the remainder's size
     under the leading set; ``repeating`` (N) is the fine structure that the strokes share, ``bursts`` (N) that
-    of readings that stand out of their strokes.
+    of readings that stand out of their strokes, ``hum`` (N) that of one frequency in all readings.
     """
 
     word: Word
@@ -47,6 +48,7 @@ class Verdict:
     size: int
     repeating: float = 0.0
     bursts: float = 0.0
+    hum: float = 0.0
 
     def others(self) -> dict[Set, float]:
         """The five likeliest sets besides the standing one, and more of those that come near, to ten."""
@@ -71,14 +73,16 @@ def judge(found: Search) -> Verdict:
     leading = sets[0]
     size = found.best_size(leading)
     problem = found.problem
-    repeating, bursts = _fine(found, leading, size)
-    fine = repeating > REPEAT_SIZE * problem.noise_level.total
+    repeating, bursts, hum = _fine(found, leading, size)
+    fine = repeating > REPEAT_SIZE * problem.noise_level.total or bursts > 0.0 or hum > 0.0
     unlessened = bool(leading) and not _lessens(found, leading)
-    if problem.saturated > 0.0 or fine or bursts > 0.0 or unlessened or _structure_left(found, leading, size):
+    if problem.saturated > 0.0 or fine or unlessened or _structure_left(found, leading, size):
         standing = _standing(found, leading)
         if not _lessens(found, standing):
             standing = frozenset()
-        return Verdict("unexplained", leading, standing, probabilities, marginals, size, repeating, bursts)
+        return Verdict(
+            "unexplained", leading, standing, probabilities, marginals, size, repeating, bursts, hum
+        )
     if not leading and probabilities[leading] > 0.5:
         return Verdict("adequate", leading, frozenset(), probabilities, marginals, size)
     lead = scores[0] - scores[1] if len(scores) > 1 else np.inf
@@ -113,17 +117,17 @@ def _lessens(found: Search, effects: Set) -> bool:
     return after <= structured(problem, found.refit(frozenset(), 0))
 
 
-def _fine(found: Search, leading: Set, size: int) -> tuple[float, float]:
-    """What the leading set leaves of the raw readings: fine structure that strokes share, and bursts (N)."""
+def _fine(found: Search, leading: Set, size: int) -> tuple[float, float, float]:
+    """What the leading set leaves of the raw readings (N): structure that strokes share, bursts, a hum."""
     problem = found.problem
     if problem.rows is None:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     rows, noise = problem.rows, problem.noise_level
     residual = raw_residual(rows, problem.blueprint.model_dump_json(), found.fits[leading, size])
     grows = grown(np.array(noise.growth), rows.force, problem.force_scale)
     # Tails that were declared are no bursts.
     bursts = 0.0 if problem.blueprint.noise.robust else bursts_rms(rows, residual, grows)
-    return repeating_rms(rows, residual), bursts
+    return repeating_rms(rows, residual), bursts, hum_rms(rows, residual)
 
 
 def _standing(found: Search, leading: Set) -> Set:

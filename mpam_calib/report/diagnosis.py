@@ -120,6 +120,9 @@ def _left(content: dict[str, Any]) -> list[str]:
             f"bursts of {size} N (over all readings) stand out of their strokes: a loose plug? What cannot "
             "be recorded again is calibrated with [noise] robust = true"
         )
+    if content["hum_N"] > 0.0:
+        size = significant(content["hum_N"])
+        found.append(f"a hum of {size} N, one frequency in all strokes: mains, a pump, a loose shield?")
     if content["remainder_N"] > 0.0 or not found:
         size = significant(content["remainder_N"])
         found.append(f"structure of {size} N is left beside every set tried")
