@@ -17,12 +17,16 @@ Array = NDArray[np.float64]
 
 FEWEST, LONGEST = 24, 256
 """Readings of a stroke that is looked at, and of a piece of one whose spectrum is taken."""
+SHORT = 0.5
+"""Share of the strokes, the shortest, that are left out."""
 PACE = 0.1
 """Strokes are of one pace where their time steps differ by less than this share."""
 GAP = 1.5
 """Time steps, in the usual one, beyond which readings are missing."""
-SLOWEST = 6
+SLOWEST = 4
 """Cycles a stroke: what is slower the reduced rows see, and the curve taken out of each stroke has."""
+STEEPEST = 4
+"""Power of the frequency by which noise falls behind a filter of second order."""
 BESIDE, FEW, NEXT = 5, 3, 2
 """Frequencies on either side with which a line is compared, at least so many, and how far away they begin."""
 ABOVE = 4.0
@@ -57,8 +61,8 @@ def _paces(rows: Rows, residual: Array) -> list[list[Array]]:
 
 
 def _spectrum(strokes: list[Array]) -> tuple[Array, int, float]:
-    """Mean periodogram of pieces as long as the shortest stroke, how many there are, what a sine gathers."""
-    length = min([LONGEST, *map(len, strokes)])
+    """Mean periodogram of pieces as long as the longer half of strokes, how many there are, what a sine gathers."""
+    length = min(LONGEST, int(np.quantile([len(s) for s in strokes], SHORT, method="lower")))
     pieces = np.array([s[i : i + length] for s in strokes for i in range(0, len(s) - length + 1, length)])
     window = np.hanning(length + 2)[1:-1]
     power = np.mean(np.abs(np.fft.rfft(pieces * window, axis=1)) ** 2, axis=0) / np.sum(window**2)
@@ -74,10 +78,16 @@ def _line(strokes: list[Array], sure: float) -> float:
     power, pieces, gathered = _spectrum([s / size for s, size in zip(strokes, sizes, strict=True)])
     found = 0.0
     for i in range(SLOWEST, len(power)):
-        sides = [power[max(i - NEXT - BESIDE + 1, NEXT) : i - NEXT + 1], power[i + NEXT : i + NEXT + BESIDE]]
-        beside = max(float(np.mean(side)) for side in sides if len(side) >= FEW)
+        slower = power[max(i - NEXT - BESIDE + 1, SLOWEST) : i - NEXT + 1]
+        faster = np.arange(i + NEXT, min(i + NEXT + BESIDE, len(power)))
+        beside = [float(np.mean(slower))] if len(slower) >= FEW else []
+        if len(faster) >= FEW:
+            steep = 1.0 if beside else (faster / i) ** STEEPEST
+            beside.append(float(np.mean(power[faster] * steep)))
+        if not beside:
+            continue
         # A periodogram's ordinate has two degrees of freedom; the window shares them between neighbours.
-        odds = stats.f.sf(power[i] / beside, 2 * pieces, BESIDE * pieces)
-        if odds < sure and power[i] > ABOVE * beside:
-            found = max(found, float(np.sqrt(2.0 * (power[i] - beside) / gathered)))
+        odds = stats.f.sf(power[i] / max(beside), 2 * pieces, BESIDE * pieces)
+        if odds < sure and power[i] > ABOVE * max(beside):
+            found = max(found, float(np.sqrt(2.0 * (power[i] - max(beside)) / gathered)))
     return found * float(np.sqrt(np.mean(sizes**2))) if found > SIZE else 0.0

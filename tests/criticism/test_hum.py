@@ -21,12 +21,13 @@ from .test_structure import NULLS, left
 
 Array = NDArray[np.float64]
 
-# A moving average over three readings, after a filter of the first order, a resonance four readings wide.
 FILTERS = {
     "white": ([1.0], [1.0]),
     "correlated for four readings": ([1.0], [1.0, -np.exp(-0.25)]),
     "mean of three": ([1.0, 1.0, 1.0], [1.0]),
     "resonant": ([1.0], [1.0, -1.0, 0.6]),
+    "second order": signal.butter(2, 0.15),
+    "second order, slow": signal.butter(2, 0.06),
 }
 
 
@@ -67,7 +68,7 @@ def hum(rows: Rows, readings: float) -> Array:
 
 
 @pytest.mark.parametrize("filtered", ["white", "correlated for four readings"])
-@pytest.mark.parametrize("readings", [2.3, 3.1])
+@pytest.mark.parametrize("readings", [2.3, 3.1, 4.6])
 def test_a_hum_is_found_with_its_size(rows: Rows, filtered: str, readings: float) -> None:
     """As large as the noise and twice as large; a fifth of it does not matter."""
     for size in (1.0, 2.0):
