@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 FEWEST, LONGEST = 24, 256
 """Readings of a stroke that is looked at, and of a piece of one whose spectrum is taken."""
 SHORT = 0.5
-"""Share of the strokes, the shortest, that are left out."""
+"""Share of the strokes, the shortest, whose spectra would be too coarse and are left out."""
 PACE = 0.1
 """Strokes are of one pace where their time steps differ by less than this share."""
 GAP = 1.5
@@ -61,7 +61,7 @@ def _paces(rows: Rows, residual: Array) -> list[list[Array]]:
 
 
 def _spectrum(strokes: list[Array]) -> tuple[Array, int, float]:
-    """Mean periodogram of pieces as long as the longer half of strokes, how many there are, what a sine gathers."""
+    """Mean periodogram of pieces of the longer strokes, how many there are, and what a sine gathers."""
     length = min(LONGEST, int(np.quantile([len(s) for s in strokes], SHORT, method="lower")))
     pieces = np.array([s[i : i + length] for s in strokes for i in range(0, len(s) - length + 1, length)])
     window = np.hanning(length + 2)[1:-1]

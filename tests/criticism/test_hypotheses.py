@@ -23,8 +23,8 @@ from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.specimen import Specimen, read
 
 
-def specimen_of(name: str) -> Specimen:
-    recipe = next(r for r in sets.recipes("develop") if r.name == name)
+def specimen_of(name: str, which: str = "develop") -> Specimen:
+    recipe = next(r for r in sets.recipes(which) if r.name == name)
     one = recipes.build_case(recipe)
     folder = Path(tempfile.mkdtemp())
     rig_case.write_case(one, folder / "specimen", folder / "truth.json")
