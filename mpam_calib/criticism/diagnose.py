@@ -115,6 +115,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "repeating_N": _round(verdict.repeating),
         "bursts_N": _round(verdict.bursts),
         "hum_N": _round(verdict.hum),
+        "load_cell_nats": None if verdict.load_cell is None else _round(verdict.load_cell),
         "searched": {
             "sets": len(diagnosis.search.seen | {effects for effects, _ in diagnosis.search.searched}),
             "largest": LARGEST,

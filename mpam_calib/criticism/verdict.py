@@ -10,6 +10,7 @@ import numpy as np
 from mpam_calib.criticism.budget import remainder_rms, structured
 from mpam_calib.criticism.bursts import bursts_rms
 from mpam_calib.criticism.hum import hum_rms
+from mpam_calib.criticism.load_cell import load_cell_rival
 from mpam_calib.criticism.problem import SIZES
 from mpam_calib.criticism.refits import Set
 from mpam_calib.criticism.repeat import raw_residual, repeating_rms
@@ -37,7 +38,8 @@ class Verdict:
 
     ``standing`` are the causes that hold even beside a remainder; ``size`` indexes the remainder's size
     under the leading set; ``repeating`` (N) is the fine structure that the strokes share, ``bursts`` (N) that
-    of readings that stand out of their strokes, ``hum`` (N) that of one frequency in all readings.
+    of readings that stand out of their strokes, ``hum`` (N) that of one frequency in all readings;
+    ``load_cell`` is by how many nats a load cell that gives way beats the leading set, where it comes near.
     """
 
     word: Word
@@ -49,6 +51,7 @@ class Verdict:
     repeating: float = 0.0
     bursts: float = 0.0
     hum: float = 0.0
+    load_cell: float | None = None
 
     def others(self) -> dict[Set, float]:
         """The five likeliest sets besides the standing one, and more of those that come near, to ten."""
@@ -76,13 +79,19 @@ def judge(found: Search) -> Verdict:
     repeating, bursts, hum = _fine(found, leading, size)
     fine = repeating > REPEAT_SIZE * problem.noise_level.total or bursts > 0.0 or hum > 0.0
     unlessened = bool(leading) and not _lessens(found, leading)
-    if problem.saturated > 0.0 or fine or unlessened or _structure_left(found, leading, size):
+    left = problem.saturated > 0.0 or fine or unlessened or _structure_left(found, leading, size)
+    rival = load_cell_rival(found, leading) if leading or left else None
+    gives_way = rival is not None and rival.lead > -LEAD
+    if left or gives_way:
         standing = _standing(found, leading)
+        if rival is not None and gives_way:
+            standing &= rival.beside
         if not _lessens(found, standing):
             standing = frozenset()
         return Verdict(
-            "unexplained", leading, standing, probabilities, marginals, size, repeating, bursts, hum
-        )
+            "unexplained", leading, standing, probabilities, marginals, size, repeating, bursts, hum,
+            rival.lead if rival is not None and gives_way else None,
+        )  # fmt: skip
     if not leading and probabilities[leading] > 0.5:
         return Verdict("adequate", leading, frozenset(), probabilities, marginals, size)
     lead = scores[0] - scores[1] if len(scores) > 1 else np.inf

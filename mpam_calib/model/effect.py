@@ -58,7 +58,8 @@ class Effect:
     Other authors' equations are forms, too: ``own`` are the parameters that a form has beside the effect's
     (such forms do not bend), ``leading`` how many of the effect's it makes use of, where not of all,
     ``recalls`` the forms that have a memory though the effect has none, and ``sources`` where the forms'
-    equations are from.
+    equations are from. A ``fault`` of an instrument is no cause to be searched, named or declared, but a
+    rival of all causes.
     """
 
     id: str
@@ -81,6 +82,7 @@ class Effect:
     leading: Mapping[str, int] = field(default_factory=dict)
     recalls: tuple[str, ...] = ()
     sources: Mapping[str, str] = field(default_factory=dict)
+    fault: bool = False
 
     @property
     def bent_forms(self) -> tuple[str, ...]:
@@ -101,7 +103,8 @@ def register(effect: Effect) -> Effect:
     if effect.id in _REGISTRY:
         raise ValueError(f"an effect with the id {effect.id!r} is registered already")
     _REGISTRY[effect.id] = effect
-    add_effect_id(effect.id, effect.all_forms)
+    if not effect.fault:
+        add_effect_id(effect.id, effect.all_forms)
     return effect
 
 
@@ -157,9 +160,10 @@ def bent(item: Effect) -> Effect:
 
 
 def known_effects() -> tuple[str, ...]:
-    """The ids of all registered effects, in the order of the chain."""
+    """The ids of all registered effects but faults, in the order of the chain."""
     _load_catalogue()
-    return tuple(sorted(_REGISTRY, key=lambda i: (_REGISTRY[i].stage, i)))
+    causes = (i for i, item in _REGISTRY.items() if not item.fault)
+    return tuple(sorted(causes, key=lambda i: (_REGISTRY[i].stage, i)))
 
 
 def _load_catalogue() -> None:

@@ -123,6 +123,12 @@ def _left(content: dict[str, Any]) -> list[str]:
     if content["hum_N"] > 0.0:
         size = significant(content["hum_N"])
         found.append(f"a hum of {size} N, one frequency in all strokes: mains, a pump, a loose shield?")
+    if content["load_cell_nats"] is not None:
+        by = "better" if content["load_cell_nats"] > 0.0 else "nearly as well"
+        found.append(
+            f"a load cell that shows less and less of large forces explains the readings {by}: load it with "
+            "dead weights up to the blocked force"
+        )
     if content["remainder_N"] > 0.0 or not found:
         size = significant(content["remainder_N"])
         found.append(f"structure of {size} N is left beside every set tried")

@@ -1,0 +1,51 @@
+"""A load cell that gives way: less and less of the force is shown near the end of its range.
+
+No cause of the contract's, and never named: whoever sees it has to look at the cell, not at the muscle. But
+what it explains must not pass for the muscle's doing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.priors import HalfLongTailed, LogNormal, LogUniform, Parameter
+from mpam_calib.model.state import Setting, State
+
+FROM, TO = 0.03, 3.0
+"""Force scales from which on it may give way: from the first newtons, or only beyond all readings."""
+
+
+def _parameters(setting: Setting) -> tuple[Parameter, ...]:
+    scale = setting.force_scale
+    return (
+        Parameter("cell_loss_N", HalfLongTailed(0.2 * scale), "lost one force scale above the knee"),
+        Parameter(
+            "cell_knee_N", LogUniform(FROM * scale, TO * scale), "reading from which the cell gives way"
+        ),
+        Parameter("cell_exponent", LogNormal(2.0, 0.4), "power of the reading beyond the knee", unit=""),
+    )
+
+
+def _apply(state: State, values: Values, setting: Setting) -> State:
+    beyond = np.clip(state.guide - values["cell_knee_N"], 0.0, None) / setting.force_scale
+    return replace(state, zero=state.zero - values["cell_loss_N"] * beyond ** values["cell_exponent"])
+
+
+register(
+    Effect(
+        id="load_cell",
+        stage=Stage.SENSOR,
+        title="Load cell that gives way",
+        sentence="the load cell shows less and less of the force near the end of its range",
+        told_by="dead weights up to the blocked force",
+        source="reading = force − loss × (reading − knee)^m / force scale^m",
+        parameters=_parameters,
+        apply=_apply,
+        memory=False,
+        uses_force=True,
+        fault=True,
+    )
+)

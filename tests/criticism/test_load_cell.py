@@ -1,0 +1,88 @@
+"""A load cell that saturates softly: what it does is nobody's cause; a fixture that gives is still named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mpam_calib.criticism.load_cell import FAULT, load_cell_rival
+from mpam_calib.criticism.search import Search, search
+from mpam_calib.criticism.verdict import judge
+from mpam_calib.model.effect import known_effects
+
+from .test_hypotheses import problem_of, specimen_of
+
+Array = NDArray[np.float64]
+RIVALS = ("rig_compliance", "wall_pressure", "braid_stretch", "dead_band", "length_offset")
+
+
+def all_the_way(force: Array) -> Array:
+    """Hyperbolic tangent: a twelfth lost at twice the typical force."""
+    most = 2.0 * force.max()
+    return np.asarray(most * np.tanh(force / most))
+
+
+def at_the_top(force: Array) -> Array:
+    """Straight for three quarters of the readings, then towards a ceiling."""
+    knee = np.quantile(force, 0.75)
+    room = force.max() - knee
+    return np.where(force > knee, knee + room * np.tanh((force - knee) / room), force)
+
+
+def below_a_ceiling(force: Array) -> Array:
+    """Softly cut off."""
+    ceiling, width = np.quantile(force, 0.94), 0.03 * force.max()
+    return np.asarray(ceiling - width * np.logaddexp(0.0, (ceiling - force) / width))
+
+
+def through(cell: Callable[[Array], Array], name: str, tested: tuple[str, ...]) -> Search:
+    """A search of a rig's test that was recorded through a cell."""
+    specimen = specimen_of(name)
+    assert specimen.loops is not None
+    loops = replace(specimen.loops, force_N=cell(specimen.loops.force_N))
+    return search(problem_of(replace(specimen, loops=loops)), tested)
+
+
+@pytest.mark.parametrize(
+    ("cell", "name"),
+    [
+        (all_the_way, "develop-null-001"),
+        (at_the_top, "develop-null-010"),
+        (below_a_ceiling, "develop-null-010"),
+    ],
+)
+def test_a_cell_that_saturates_softly_is_no_cause(cell: Callable[[Array], Array], name: str) -> None:
+    """Nothing is hidden; a search without this rival names a fixture that gives, or two causes and three."""
+    verdict = judge(through(cell, name, RIVALS))
+    assert verdict.leading
+    assert (verdict.word, verdict.standing) == ("unexplained", frozenset())
+    assert verdict.load_cell is not None
+    assert verdict.load_cell > 10.0
+
+
+def test_a_cause_beside_the_cell_stands() -> None:
+    """Creep, which no function of the force imitates, is still named beside it."""
+    found = through(all_the_way, "develop-separable-012", ("creep", *RIVALS[:2]))
+    verdict = judge(found)
+    assert verdict.word == "unexplained"
+    assert verdict.standing <= {"creep"}
+    assert load_cell_rival(found, verdict.leading).beside == {"creep"}
+
+
+@pytest.mark.parametrize(
+    ("name", "truth"),
+    [("develop-separable-039", {"rig_compliance"}), ("develop-separable-015", {"dead_band"})],
+)
+def test_a_fixture_that_gives_is_no_load_cell(name: str, truth: set[str]) -> None:
+    found = through(lambda force: force, name, RIVALS)
+    verdict = judge(found)
+    assert (verdict.word, verdict.standing, verdict.load_cell) == ("named", truth, None)
+    assert load_cell_rival(found, verdict.leading).lead < -10.0
+
+
+def test_the_fault_is_no_effect_that_a_specimen_may_declare() -> None:
+    assert FAULT not in known_effects()
