@@ -111,10 +111,11 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
             }
             for before, after in diagnosis.structure
         ],
-        "saturated_share": _round(diagnosis.problem.saturated),
-        "repeating_N": _round(verdict.repeating),
-        "bursts_N": _round(verdict.bursts),
-        "hum_N": _round(verdict.hum),
+        "saturated_share": _round(verdict.faults.saturated),
+        "repeating_N": _round(verdict.faults.repeating),
+        "bursts_N": _round(verdict.faults.bursts),
+        "hum_N": _round(verdict.faults.hum),
+        "step_N": _round(verdict.faults.step),
         "load_cell_nats": None if verdict.load_cell is None else _round(verdict.load_cell),
         "searched": {
             "sets": len(diagnosis.search.seen | {effects for effects, _ in diagnosis.search.searched}),

@@ -32,6 +32,9 @@ class Rival:
     beside: Set
 
 
+NO_RIVAL = Rival(-np.inf, frozenset())
+
+
 def load_cell_rival(found: Search, leading: Set) -> Rival:
     """The fault alone, or in place of some of the leading set's causes: at least as plain as that set."""
     most = max(len(leading) - 1, 0)
@@ -47,7 +50,7 @@ def load_cell_rival(found: Search, leading: Set) -> Rival:
         if terms:
             scores[beside] = float(np.logaddexp.reduce(terms)) + found.log_prior(beside | {FAULT})
     if not scores:
-        return Rival(-np.inf, frozenset())
+        return NO_RIVAL
     best = max(scores, key=lambda s: scores[s])
     return Rival(scores[best] - found.score(leading), best)
 

@@ -8,14 +8,11 @@ from typing import Literal
 import numpy as np
 
 from mpam_calib.criticism.budget import remainder_rms, structured
-from mpam_calib.criticism.bursts import bursts_rms
-from mpam_calib.criticism.hum import hum_rms
-from mpam_calib.criticism.load_cell import load_cell_rival
+from mpam_calib.criticism.faults import FAULTLESS, Faults, faults_of
+from mpam_calib.criticism.load_cell import NO_RIVAL, load_cell_rival
 from mpam_calib.criticism.problem import SIZES
 from mpam_calib.criticism.refits import Set
-from mpam_calib.criticism.repeat import raw_residual, repeating_rms
 from mpam_calib.criticism.search import Search
-from mpam_calib.model.noise import grown
 
 Word = Literal["adequate", "named", "ambiguous", "unexplained"]
 
@@ -28,8 +25,6 @@ BESIDE = 10.0
 """Nats below the likeliest set down to which these data hardly separate others from it."""
 NOISE_SIZE = 0.5
 """A remainder whose root mean square is below this share of a reading's noise is at its level."""
-REPEAT_SIZE = 0.2
-"""The same for fine structure that repeats, which itself passes for noise in a single stroke."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +32,8 @@ class Verdict:
     """The word, the leading set, and every set with its probability (best first).
 
     ``standing`` are the causes that hold even beside a remainder; ``size`` indexes the remainder's size
-    under the leading set; ``repeating`` (N) is the fine structure that the strokes share, ``bursts`` (N) that
-    of readings that stand out of their strokes, ``hum`` (N) that of one frequency in all readings;
-    ``load_cell`` is by how many nats a load cell that gives way beats the leading set, where it comes near.
+    under the leading set, which leaves the ``faults``; ``load_cell`` is by how many nats a load cell that
+    gives way beats that set, where it comes near.
     """
 
     word: Word
@@ -48,9 +42,7 @@ class Verdict:
     probabilities: dict[Set, float]
     marginals: dict[str, float]
     size: int
-    repeating: float = 0.0
-    bursts: float = 0.0
-    hum: float = 0.0
+    faults: Faults = FAULTLESS
     load_cell: float | None = None
 
     def others(self) -> dict[Set, float]:
@@ -76,33 +68,27 @@ def judge(found: Search) -> Verdict:
     leading = sets[0]
     size = found.best_size(leading)
     problem = found.problem
-    repeating, bursts, hum = _fine(found, leading, size)
-    fine = repeating > REPEAT_SIZE * problem.noise_level.total or bursts > 0.0 or hum > 0.0
+    faults = faults_of(problem, found.fits[leading, size])
     unlessened = bool(leading) and not _lessens(found, leading)
-    left = problem.saturated > 0.0 or fine or unlessened or _structure_left(found, leading, size)
-    rival = load_cell_rival(found, leading) if leading or left else None
-    gives_way = rival is not None and rival.lead > -LEAD
+    left = bool(faults) or unlessened or _structure_left(found, leading, size)
+    # Where nothing is the likeliest, or cannot be excluded, no structure beyond the noise was shown.
+    nothing = not leading or (frozenset() in sets[:LISTED] and probabilities[frozenset()] > 1.0 - SURE)
+    rival = load_cell_rival(found, leading) if left or not nothing else NO_RIVAL
+    gives_way = rival.lead > -LEAD
     if left or gives_way:
         standing = _standing(found, leading)
-        if rival is not None and gives_way:
+        if gives_way:
             standing &= rival.beside
         if not _lessens(found, standing):
             standing = frozenset()
-        return Verdict(
-            "unexplained", leading, standing, probabilities, marginals, size, repeating, bursts, hum,
-            rival.lead if rival is not None and gives_way else None,
-        )  # fmt: skip
-    if not leading and probabilities[leading] > 0.5:
-        return Verdict("adequate", leading, frozenset(), probabilities, marginals, size)
+        load_cell = rival.lead if gives_way else None
+        return Verdict("unexplained", leading, standing, probabilities, marginals, size, faults, load_cell)
+    if nothing:
+        size = found.best_size(frozenset())
+        return Verdict("adequate", frozenset(), frozenset(), probabilities, marginals, size)
     lead = scores[0] - scores[1] if len(scores) > 1 else np.inf
-    if leading and probabilities[leading] >= SURE and lead >= LEAD:
-        return Verdict("named", leading, leading, probabilities, marginals, size)
-    if not leading or (frozenset() in sets[:LISTED] and probabilities[frozenset()] > 1.0 - SURE):
-        # Nothing is the likeliest, or cannot be excluded: no structure beyond the noise was shown.
-        return Verdict(
-            "adequate", frozenset(), frozenset(), probabilities, marginals, found.best_size(frozenset())
-        )
-    return Verdict("ambiguous", leading, leading, probabilities, marginals, size)
+    word: Word = "named" if probabilities[leading] >= SURE and lead >= LEAD else "ambiguous"
+    return Verdict(word, leading, leading, probabilities, marginals, size)
 
 
 def _structure_left(found: Search, leading: Set, size: int) -> bool:
@@ -124,19 +110,6 @@ def _lessens(found: Search, effects: Set) -> bool:
     problem = found.problem
     after = structured(problem, found.refit(effects, 0))
     return after <= structured(problem, found.refit(frozenset(), 0))
-
-
-def _fine(found: Search, leading: Set, size: int) -> tuple[float, float, float]:
-    """What the leading set leaves of the raw readings (N): structure that strokes share, bursts, a hum."""
-    problem = found.problem
-    if problem.rows is None:
-        return 0.0, 0.0, 0.0
-    rows, noise = problem.rows, problem.noise_level
-    residual = raw_residual(rows, problem.blueprint.model_dump_json(), found.fits[leading, size])
-    grows = grown(np.array(noise.growth), rows.force, problem.force_scale)
-    # Tails that were declared are no bursts.
-    bursts = 0.0 if problem.blueprint.noise.robust else bursts_rms(rows, residual, grows)
-    return repeating_rms(rows, residual), bursts, hum_rms(rows, residual)
 
 
 def _standing(found: Search, leading: Set) -> Set:

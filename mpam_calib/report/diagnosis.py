@@ -123,6 +123,9 @@ def _left(content: dict[str, Any]) -> list[str]:
     if content["hum_N"] > 0.0:
         size = significant(content["hum_N"])
         found.append(f"a hum of {size} N, one frequency in all strokes: mains, a pump, a loose shield?")
+    if content["step_N"] > 0.0:
+        size = significant(content["step_N"])
+        found.append(f"forces are recorded in steps of {size} N, coarser than their noise: use a finer range")
     if content["load_cell_nats"] is not None:
         by = "better" if content["load_cell_nats"] > 0.0 else "nearly as well"
         found.append(

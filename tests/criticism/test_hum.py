@@ -104,4 +104,4 @@ def test_the_verdict_on_a_rig_that_hums() -> None:
     verdict = judge(search(problem, ("dead_band", "creep"), workers=1))
     assert verdict.word == "unexplained"
     assert verdict.standing == frozenset()
-    assert verdict.hum > 0.0
+    assert verdict.faults.hum > 0.0

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from mpam_calib.criticism.bursts import bursts_rms
+from mpam_calib.criticism.converter import coarse_step
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.repeat import raw_residual, repeating_rms
@@ -192,3 +193,17 @@ def test_what_comes_back_in_the_next_cycle_is_no_burst(null: tuple[Problem, Fit]
     residual = left(problem, fitted) + notch
     assert bursts_rms(problem.rows, residual, np.ones(len(x))) == 0.0
     assert repeating_rms(problem.rows, residual) > 0.0
+
+
+@pytest.mark.parametrize("name", NULLS)
+@pytest.mark.parametrize(("steps", "seen"), [(0.5, False), (1.5, False), (8.0, True), (20.0, True)])
+def test_a_converter_coarser_than_the_noise_is_seen(name: str, steps: float, seen: bool) -> None:
+    """Steps in the noise's sd: what noise smears out is a usual export, what it does not is not."""
+    loops = specimen_of(name).loops
+    assert loops is not None
+    noise = problem_of(specimen_of(name)).noise_level.total
+    step = steps * noise
+    force = np.round(step * np.round(loops.force_N / step), 4)
+    with_steps = float(np.hypot(noise, step / np.sqrt(12.0)))
+    assert coarse_step(force, with_steps) == pytest.approx(step if seen else 0.0, rel=0.01)
+    assert coarse_step(loops.force_N, noise) == 0.0
