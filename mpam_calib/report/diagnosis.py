@@ -132,7 +132,7 @@ def _left(content: dict[str, Any]) -> list[str]:
             f"a load cell that shows less and less of large forces explains the readings {by}: load it with "
             "dead weights up to the blocked force"
         )
-    if content["remainder_N"] > 0.0 or not found:
+    elif content["remainder_N"] > 0.0 or not found:
         size = significant(content["remainder_N"])
         found.append(f"structure of {size} N is left beside every set tried")
     return found
