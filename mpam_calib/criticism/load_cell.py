@@ -7,7 +7,7 @@ the moduli missing: causes that a search names where it has no other word for it
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from math import log
 
 import numpy as np
@@ -39,16 +39,13 @@ def load_cell_rival(found: Search, leading: Set) -> Rival:
     """The fault alone, or in place of some of the leading set's causes: at least as plain as that set."""
     most = max(len(leading) - 1, 0)
     sets = [frozenset(c) for k in range(most + 1) for c in combinations(sorted(leading), k)]
-    sizes = sorted({0, found.best_size(leading)})
-    tasks = [(size, _tries(found, beside, size), found.doubting) for beside in sets for size in sizes]
-    fits = list(found.spread(best_of, tasks))
-    scores = {}
-    for i, beside in enumerate(sets):
-        terms = [
-            f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits[i * len(sizes) : (i + 1) * len(sizes)] if f
-        ]
-        if terms:
-            scores[beside] = float(np.logaddexp.reduce(terms)) + found.log_prior(beside | {FAULT})
+    keys = list(product(sets, sorted({0, found.best_size(leading)})))
+    fits = found.spread(best_of, [(size, _tries(found, s, size), found.doubting) for s, size in keys])
+    terms: dict[Set, list[float]] = {}
+    for (beside, size), fitted in zip(keys, fits, strict=True):
+        if fitted is not None:
+            terms.setdefault(beside, []).append(fitted.log_evidence + log(SIZE_PRIOR[size]))
+    scores = {s: float(np.logaddexp.reduce(t)) + found.log_prior(s | {FAULT}) for s, t in terms.items()}
     if not scores:
         return NO_RIVAL
     best = max(scores, key=lambda s: scores[s])
