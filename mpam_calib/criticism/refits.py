@@ -69,8 +69,8 @@ def _better(
     doubts: tuple[float, ...] = (),
 ) -> Fit | None:
     try:
-        with warnings.catch_warnings():
-            # On its way a climb may pass through shapes that no muscle has.
+        # On its way a climb may pass through shapes that no muscle has.
+        with warnings.catch_warnings(), np.errstate(over="ignore", invalid="ignore"):
             warnings.simplefilter("ignore", linalg.LinAlgWarning)
             found = fit(held_problem(), frozenset(forms), size, start, doubts=doubts)
     except np.linalg.LinAlgError:

@@ -17,6 +17,9 @@ from mpam_calib.model.state import Setting, State
 FROM, TO = 0.03, 3.0
 """Force scales from which on it may give way: from the first newtons, or only beyond all readings."""
 
+MOST = 10.0
+"""Force scales beyond the knee up to which it is followed: on its way a climb may pass any force."""
+
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     scale = setting.force_scale
@@ -30,7 +33,7 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    beyond = np.clip(state.guide - values["cell_knee_N"], 0.0, None) / setting.force_scale
+    beyond = np.clip((state.guide - values["cell_knee_N"]) / setting.force_scale, 0.0, MOST)
     return replace(state, zero=state.zero - values["cell_loss_N"] * beyond ** values["cell_exponent"])
 
 
