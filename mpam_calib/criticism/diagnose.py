@@ -11,6 +11,7 @@ import numpy as np
 from mpam_calib.criticism.budget import Budget, misfit_budget
 from mpam_calib.criticism.candidates import Candidates, candidates
 from mpam_calib.criticism.gain import Gain, measure_gain
+from mpam_calib.criticism.limits import Band, hidden_sizes
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.refits import Set
 from mpam_calib.criticism.search import LARGEST, Search, search
@@ -39,6 +40,8 @@ class Diagnosis:
     gain: Gain | None
     structure: list[tuple[Structure, Structure]]
     """Every test of structure before and after."""
+    limits: dict[str, Band]
+    """How large each effect could be unseen (SI), where nothing is found."""
 
     @property
     def causes(self) -> list[str]:
@@ -85,7 +88,8 @@ def diagnose(
         gain = measure_gain(problem, tested.tested, named, WORKERS, share_done)
     fits = [found.fits[s, found.best_size(s)] for s in (frozenset(), verdict.standing)]
     structure = list(zip(*(structure_tests(problem, f) for f in fits), strict=True))
-    return Diagnosis(problem, tested, found, verdict, budget, gain, structure)
+    limits = hidden_sizes(problem, tested.tested) if verdict.word == "adequate" else {}
+    return Diagnosis(problem, tested, found, verdict, budget, gain, structure, limits)
 
 
 def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
@@ -96,6 +100,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "causes": [_cause(diagnosis, e, seed) for e in diagnosis.causes],
         "alternatives": [{"ids": sorted(s), "probability": _round(p)} for s, p in verdict.others().items()],
         "not_tested": [{"id": i, "why": why} for i, why in diagnosis.candidates.not_tested],
+        "limits": [_limit(diagnosis, e) for e in sorted(diagnosis.limits)],
         "noise_N": _round(budget.noise),
         "misfit_before_N": _round(budget.before),
         "misfit_after_N": _round(budget.after),
@@ -172,6 +177,15 @@ def _cause(diagnosis: Diagnosis, identifier: str, seed: int) -> dict[str, Any]:
         "share_of_misfit": _round(diagnosis.budget.shares[identifier]),
         "within_declared_uncertainty": within,
     }
+
+
+def _limit(diagnosis: Diagnosis, identifier: str) -> dict[str, Any]:
+    """How large an effect could be by itself without being seen, lab units."""
+    setting = diagnosis.problem.model.setting
+    assert setting is not None
+    (parameter,) = effect(identifier).parameters(setting)
+    low, high = (_round(x / si_factor(parameter.name)) for x in diagnosis.limits[identifier])
+    return {"id": identifier, "parameters": {parameter.name: {"q05": low, "q95": high}}}
 
 
 def _round(x: float) -> float:

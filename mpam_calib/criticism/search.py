@@ -182,6 +182,8 @@ class Search:
             *(s for k in count for s in [q for q in sets if len(q) == k][:DOUBTED_EACH]),
         }
         chosen |= {frozenset(p) for s in sets[:LEADERS] for p in combinations(sorted(s), max(len(s) - 1, 0))}
+        if frozenset() in sets[:LEADERS]:  # what could hide, though nothing was found?
+            chosen |= {frozenset([e]) for e in self.tested}
         keys = [key for key in self.fits if key[0] in chosen]
         doubted = self.spread(with_doubt, [self.fits[key] for key in keys], chunk=2)
         # A doubt has its price in evidence: who does not pay it cannot be compared with those who do.

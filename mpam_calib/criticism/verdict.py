@@ -33,7 +33,8 @@ class Verdict:
 
     ``standing`` are the causes that hold even beside a remainder; ``size`` indexes the remainder's size
     under the leading set, which leaves the ``faults``; ``load_cell`` is by how many nats a load cell that
-    gives way beats that set, where it comes near.
+    gives way beats that set, where it comes near; ``unseen`` are the single causes that the data do not
+    exclude where nothing is found.
     """
 
     word: Word
@@ -44,11 +45,13 @@ class Verdict:
     size: int
     faults: Faults = FAULTLESS
     load_cell: float | None = None
+    unseen: frozenset[Set] = frozenset()
 
     def others(self) -> dict[Set, float]:
-        """The five likeliest sets besides the standing one, and more of those that come near, to ten."""
+        """The five likeliest sets besides the standing one, more that come near, to ten, and the unseen."""
         others = [s for s in self.probabilities if s != self.standing]
-        return {s: self.probabilities[s] for s in others[: max(LISTED, min(self.near(), 2 * LISTED))]}
+        first = max(LISTED, min(self.near(), 2 * LISTED))
+        return {s: self.probabilities[s] for i, s in enumerate(others) if i < first or s in self.unseen}
 
     def near(self) -> int:
         """How many sets, neither the standing one nor the likeliest, come within ``BESIDE`` nats of this."""
@@ -85,10 +88,18 @@ def judge(found: Search) -> Verdict:
         return Verdict("unexplained", leading, standing, probabilities, marginals, size, faults, load_cell)
     if nothing:
         size = found.best_size(frozenset())
-        return Verdict("adequate", frozenset(), frozenset(), probabilities, marginals, size)
+        unseen = frozenset(s for s in sets if len(s) == 1 and _not_excluded(found, s))
+        return Verdict("adequate", frozenset(), frozenset(), probabilities, marginals, size, unseen=unseen)
     lead = scores[0] - scores[1] if len(scores) > 1 else np.inf
     word: Word = "named" if probabilities[leading] >= SURE and lead >= LEAD else "ambiguous"
     return Verdict(word, leading, leading, probabilities, marginals, size)
+
+
+def _not_excluded(found: Search, effects: Set) -> bool:
+    """Whether the data themselves, whatever the prior odds, hardly tell a set from nothing."""
+    nothing: Set = frozenset()
+    gap = found.score(nothing) - found.score(effects)
+    return gap - (found.log_prior(nothing) - found.log_prior(effects)) < BESIDE
 
 
 def _structure_left(found: Search, leading: Set, size: int) -> bool:

@@ -73,6 +73,7 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
         Section("Misfit budget", _budget(found, content)),
         Section("Where the misfit shows", _structure(content)),
         Section("Causes", _causes(causes)),
+        *([Section("What could hide unseen", _limits(content))] if content["limits"] else []),
         Section("What else could it be", _alternatives(content, found.verdict.near())),
         Section("Gain on data the fit never saw", _gain(content)),
         Section("What these data cannot test", _not_tested(content)),
@@ -234,6 +235,29 @@ def _alternatives(content: dict[str, Any], near: int) -> list[Block]:
         for a in content["alternatives"]
     ]
     return [Text(text), DataTable(pd.DataFrame(rows), "Other sets of causes", {"probability": "{}"})]
+
+
+def _limits(content: dict[str, Any]) -> list[Block]:
+    """How large each effect could be without being seen."""
+    text = (
+        "Nothing was found; that is not to say that nothing is there. Each effect by itself could have any "
+        "size inside its 90 % band and these data would look the same. Where such a size would "
+        "matter to you, make the measurement beside it."
+    )
+    rows = [
+        {
+            "effect": effect(limit["id"]).title,
+            "parameter": name,
+            "5 %": band["q05"],
+            "95 %": band["q95"],
+            "unit": unit_of(name),
+            "what would show it": effect(limit["id"]).told_by,
+        }
+        for limit in content["limits"]
+        for name, band in limit["parameters"].items()
+    ]
+    formats = dict.fromkeys(["5 %", "95 %"], "{:.2g}")
+    return [Text(text), DataTable(pd.DataFrame(rows), "Sizes that these data leave room for", formats)]
 
 
 def _telling(one: set[str], other: set[str]) -> str:

@@ -55,6 +55,10 @@ def test_nothing_hidden_is_adequate_and_the_bytes_repeat(tmp_path: Path) -> None
     assert first == second
     content = json.loads(first)
     assert (content["verdict"], content["causes"], content["gain"]) == ("adequate", [], None)
+    # What could hide even so: sizes and names.
+    unseen = {limit["id"] for limit in content["limits"]}
+    assert unseen & {"length_offset", "creep"} <= {a for s in content["alternatives"] for a in s["ids"]}
+    assert "What could hide unseen" in (tmp_path / "first" / "report.html").read_text()
     # What was declared and is not used is said on the page.
     assert "Heavy tails of the noise" in (tmp_path / "first" / "report.html").read_text()
 

@@ -1,0 +1,132 @@
+"""What could hide where nothing is found: how large each effect may be, by itself, without being seen.
+
+"Adequate" says that no cause was shown, not that there is none. The posterior of one effect's size beside
+the declared simulation, with Laplace's integral over all else at every value of the size, says how much of it
+these data leave room for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import integrate, interpolate, linalg
+
+from mpam_calib.criticism.climb import Climb, Place, furthest_of
+from mpam_calib.criticism.fit import chain_for
+from mpam_calib.criticism.problem import Problem
+from mpam_calib.model.effect import effect
+
+Array = NDArray[np.float64]
+
+BAND = (0.05, 0.95)
+STEPS, WIDEST = 4.0, 0.1
+"""Points per posterior sd, and their largest distance (prior sds): near a bound a density is no parabola."""
+DEPTH = 9.0
+"""Nats below the highest point at which the density counts for nothing."""
+MOST_POINTS, FINE = 400, 2000
+"""Points at which the density is looked at on either side, and between which it is interpolated."""
+EXCLUDED = 5.0
+"""Nats behind the best kind of an effect (whose clock, which force) from which on a kind is left out."""
+
+Band = tuple[float, float]
+
+
+def hidden_sizes(problem: Problem, effects: Iterable[str]) -> dict[str, Band]:
+    """The 90 % band (SI) of the size of each effect that has just one parameter.
+
+    The noise is all that is beside it: what a remainder may hold could hide anything. An effect of several
+    kinds has the band that holds those of all its kinds.
+    """
+    setting = problem.model.setting
+    assert setting is not None
+    bands = {}
+    for e in effects:
+        kinds = (e, *(f"{e}:{kind}" for kind in effect(e).kinds))
+        found = [
+            f for kind in kinds if len(effect(kind).parameters(setting)) == 1 and (f := _band(problem, kind))
+        ]
+        if found:
+            best = max(evidence for evidence, _ in found)
+            lows, highs = zip(*(band for evidence, band in found if evidence > best - EXCLUDED), strict=True)
+            bands[e] = (min(lows), max(highs))
+    return bands
+
+
+def _band(problem: Problem, form: str) -> tuple[float, Band] | None:
+    """The log evidence (up to a constant) and the band; None where no muscle has this effect."""
+    setting = problem.model.setting
+    assert setting is not None
+    (own,) = effect(form).parameters(setting)
+    chain = chain_for(problem.blueprint.model_dump_json(), frozenset([form]))
+    climb = Climb(problem, chain, 0, np.empty((len(problem), 0)))
+    try:
+        mode = climb.climb(np.zeros(len(climb.names)), climb.guide(), np.zeros(chain.linear_size))
+    except np.linalg.LinAlgError:
+        return None
+    if not np.isfinite(mode.objective):
+        return None
+    points, found = _walk(climb, mode, climb.names.index(own.name))
+    u = np.linspace(points[0], points[-1], FINE)
+    log_density = interpolate.PchipInterpolator(points, found)(u)
+    top = float(log_density.max())
+    density = np.exp(log_density - top)
+    mass = integrate.cumulative_trapezoid(density, u, initial=0)
+    low, high = np.interp(BAND, mass / mass[-1], own.prior.from_normal(u))
+    return top + float(np.log(mass[-1])), (float(low), float(high))
+
+
+def _walk(climb: Climb, mode: Place, i: int) -> tuple[Array, Array]:
+    """Coordinates of one size, on both sides of the mode, and the log density there (up to a constant)."""
+    J = climb.slopes(mode)
+    covariance = linalg.inv(J.T @ J + np.eye(J.shape[1]))
+    step = min(float(np.sqrt(covariance[i, i])) / STEPS, WIDEST)
+    furthest = float(furthest_of(climb.chain.parameters)[i])
+    found = {float(mode.u[i]): _log_density(climb, mode, i)}
+    top = max(found.values())
+    for direction in (-step, step):
+        place = mode
+        for _point in range(MOST_POINTS):
+            u = place.u.copy()
+            u[i] += direction
+            if abs(u[i]) > furthest:
+                break
+            place = climb.look_with_its_signs(u, place.guide, place.eta)
+            place = _eased(climb, place, i)
+            found[float(u[i])] = value = _log_density(climb, place, i)
+            top = max(top, value)
+            if not value > top - DEPTH:
+                break
+    u = np.array(sorted(found))
+    return u, np.array([found[x] for x in u])
+
+
+def _others(climb: Climb, place: Place, i: int) -> tuple[Array, Array, Array]:
+    """Hessian and gradient of all coordinates but the i-th, and which of them are sizes."""
+    others = np.delete(np.arange(len(place.u) + place.columns.shape[1]), i)
+    J = climb.slopes(place)[:, others]
+    gradient = J.T @ place.residual - np.concatenate([place.u, place.eta])[others]
+    return J.T @ J + np.eye(len(others)), gradient, others
+
+
+def _eased(climb: Climb, place: Place, i: int) -> Place:
+    """The place after one step of all other coordinates towards their best."""
+    hessian, gradient, others = _others(climb, place, i)
+    sizes = others < len(place.u)
+    if not sizes.any():
+        return place
+    u = place.u.copy()
+    u[others[sizes]] += linalg.solve(hessian, gradient, assume_a="pos")[sizes]
+    better = climb.look_with_its_signs(u, place.guide, place.eta)
+    return better if better.objective > place.objective else place
+
+
+def _log_density(climb: Climb, place: Place, i: int) -> float:
+    """Laplace's integral over all other coordinates."""
+    hessian, gradient, _ = _others(climb, place, i)
+    if not len(gradient):
+        return place.objective
+    factor = linalg.cho_factor(hessian, lower=True)
+    log_det = 2.0 * float(np.sum(np.log(np.diagonal(factor[0]))))
+    return place.objective + 0.5 * float(gradient @ linalg.cho_solve(factor, gradient)) - 0.5 * log_det

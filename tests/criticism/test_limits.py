@@ -1,0 +1,111 @@
+"""How large an effect could be unseen: known posteriors, and sizes hidden by another rig below detection."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from rig import case as rig_case
+from rig import recipes, sets
+from rig.effects import form as rig_form
+from scipy import integrate, linalg
+
+from mpam_calib.criticism.candidates import candidates
+from mpam_calib.criticism.fit import chain_for
+from mpam_calib.criticism.limits import hidden_sizes
+from mpam_calib.criticism.problem import Problem
+from mpam_calib.model.effect import effect
+from mpam_calib.specimen import read
+from mpam_calib.units import si_factor
+
+from .test_hypotheses import problem_of, specimen_of
+
+Array = NDArray[np.float64]
+
+WITHOUT_FRICTION = "develop-null-006"
+"""Tensile moduli with one factor, no friction: but for the effect's size the force is linear."""
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    found = problem_of(specimen_of(WITHOUT_FRICTION))
+    assert found.model.chain is not None
+    assert not found.model.chain.parameters
+    return found
+
+
+def log_likelihood(problem: Problem, identifier: str, x: Array) -> Array:
+    """Of sizes (k,), the moduli's factor integrated out in closed form: normal, by dense algebra."""
+    chain = chain_for(problem.blueprint.model_dump_json(), frozenset([identifier]))
+    readings, first, second = problem.lean
+    (name,) = (p.name for p in chain.parameters)
+    found = []
+    for size in x:
+        terms = chain.terms({name: np.full((1, 1), size)}, readings)
+        fixed = 0.5 * (terms.fixed[0, first] + terms.fixed[0, second]) + problem.bow
+        columns = 0.5 * (terms.columns[0, first] + terms.columns[0, second])
+        factor = linalg.cholesky(problem.covariance(0.0) + columns @ columns.T, lower=True)
+        white = linalg.solve_triangular(factor, problem.force - fixed, lower=True)
+        found.append(-0.5 * white @ white - np.sum(np.log(np.diagonal(factor))))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("identifier", ["force_drift", "length_offset", "braid_stretch", "pressure_droop"])
+def test_the_band_is_that_of_the_known_posterior(problem: Problem, identifier: str) -> None:
+    """Of either sign, and of one: there the density falls off a cliff at nothing."""
+    kinds = (f"{identifier}:{kind}" for kind in effect(identifier).kinds)
+    low, high = hidden_sizes(problem, [identifier])[identifier]
+    width = high - low
+    bands = []
+    for form in (identifier, *kinds):
+        (parameter,) = effect(form).parameters(problem.model.setting)
+        # Far beyond the band on both sides, or down to a hundredth of it where there is but one sign.
+        ends = np.array([low - 2.0 * width if low < 0.0 else 0.01 * low, high + 2.0 * width])
+        u = np.linspace(*parameter.prior.to_normal(ends), 300)
+        x = parameter.prior.from_normal(u)
+        log_density = log_likelihood(problem, form, x) - 0.5 * u**2
+        density = np.exp(log_density - log_density.max())
+        mass = integrate.cumulative_trapezoid(density, u, initial=0)
+        bands.append(np.interp([0.05, 0.95], mass / mass[-1], x))
+    expected = np.min(bands, axis=0)[0], np.max(bands, axis=0)[1]
+    assert (low, high) == pytest.approx(expected, abs=0.03 * (expected[1] - expected[0]))
+
+
+def test_nothing_is_inside_where_nothing_is_hidden() -> None:
+    """Sizes that may have either sign, four muscles of another rig."""
+    inside = []
+    for name in [r.name for r in sets.recipes("develop") if r.group == "null"][:4]:
+        found = problem_of(specimen_of(name))
+        bands = hidden_sizes(found, candidates(found).tested).values()
+        inside += [low < 0.0 < high for low, high in bands if low < 0.0 or high < 0.0]
+    assert len(inside) >= 30
+    assert np.mean(inside) >= 0.85
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("share", "least"), [(0.03, 13), (0.1, 13)])
+def test_small_sizes_of_another_rig_are_inside(share: float, least: int) -> None:
+    """One cause whose form is shared, at a small share of its size: nine bands in ten hold it."""
+    inside = []
+    for recipe in (*sets.recipes("develop"), *sets.recipes("practice")):
+        one = recipes.build_case(recipe)
+        if len(one.hidden) != 1 or one.outside:
+            continue
+        (hidden,) = one.hidden
+        form = rig_form(hidden.id, hidden.form)
+        if not form.shared or form.parameter in ("", "next_order"):
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            small = replace(one, hidden=(replace(hidden, size=share * hidden.size),))
+            rig_case.write_case(small, Path(folder) / "specimen", Path(folder) / "truth.json")
+            found = problem_of(read(Path(folder) / "specimen"))
+        bands = hidden_sizes(found, [hidden.id])
+        if hidden.id in bands:
+            low, high = np.array(bands[hidden.id]) / si_factor(form.parameter)
+            inside.append(low <= share * hidden.size <= high)
+    assert len(inside) >= 15
+    assert sum(inside) >= least, inside
