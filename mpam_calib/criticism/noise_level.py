@@ -20,7 +20,7 @@ from mpam_calib.criticism.noise_windows import DEGREE, Windows, between_strokes,
 from mpam_calib.model.model import Model
 from mpam_calib.model.noise import CORRELATED, GROWTH, SHORTEST, TIME, WHITE, grown
 from mpam_calib.model.priors import LogUniform, Prior
-from mpam_calib.posterior.covariance import fast_noise_covariance, fast_noise_log_likelihood
+from mpam_calib.posterior.covariance import fast_noise_covariance, scatter_log_likelihood
 from mpam_calib.posterior.sites import chunk_log_likelihood
 from mpam_calib.specimen.recording import Loops
 
@@ -162,11 +162,13 @@ def _log_likelihood(windows: Windows, noise: NoiseLevel, averaged: int, scale: f
     sizes = [np.array([size]) for size in (noise.white, noise.correlated, noise.time)]
     total = 0.0
     for some in windows.paces():
-        scatter = some.scatter(noise.reading or float(np.median(some.dt)))
+        # A difference of two strokes has noise of both, each at its own pace.
+        steps = [noise.reading] if noise.reading else np.unique(np.median(some.dt, axis=0))
+        seen = [some.scatter(float(dt)) for dt in steps]
+        covariance = np.mean([fast_noise_covariance(s, averaged, *sizes) for s in seen], axis=0)
         if noise.growth == 0.0:
-            total += float(fast_noise_log_likelihood(scatter, averaged, *sizes)[0])
+            total += float(scatter_log_likelihood(*seen[0][:2], covariance)[0])
         else:
-            covariance = fast_noise_covariance(scatter, averaged, *sizes)
             grows = grown(np.array([[noise.growth]]), some.force, scale)
             total += float(chunk_log_likelihood(covariance, some.chunks, grows)[0])
     return total

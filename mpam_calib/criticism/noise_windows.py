@@ -33,7 +33,10 @@ PACE = 0.1
 
 
 class Windows(NamedTuple):
-    """What the contrasts of windows see (k, dof), the windows' mean forces (k,) and time steps (k,), s."""
+    """What the contrasts of windows see (k, dof), the windows' mean forces (k,) and time steps (k, 2), s.
+
+    A window of two strokes has the steps of both, another one its own twice.
+    """
 
     chunks: Array
     force: Array
@@ -51,10 +54,13 @@ class Windows(NamedTuple):
         return self._take(power <= USUAL * np.median(power))
 
     def paces(self) -> list[Windows]:
-        """The windows parted by their time step, which strokes at two speeds may have one each of."""
-        order = np.argsort(self.dt, kind="stable")
-        cuts = np.flatnonzero(np.diff(np.log(self.dt[order])) > PACE) + 1
-        return [self._take(some) for some in np.split(order, cuts)]
+        """The windows parted by their time steps, which strokes at two speeds may have one each of."""
+        log = np.log(self.dt).ravel()
+        order = np.argsort(log, kind="stable")
+        pace = np.empty(len(log), dtype=np.int64)
+        pace[order] = np.cumsum(np.diff(log[order], prepend=log[order[0]]) > PACE)
+        kinds, own = np.unique(np.sort(pace.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+        return [self._take(np.flatnonzero(own.ravel() == kind)) for kind in range(len(kinds))]
 
     def _take(self, which: NDArray[np.bool_] | Ints) -> Windows:
         return self._replace(chunks=self.chunks[which], force=self.force[which], dt=self.dt[which])
@@ -94,7 +100,7 @@ def _cut(loops: Loops, size: int, margin: int, degree: int) -> Windows | None:
     if len(index) < 4:
         return None
     dt = (loops.time_s[index[:, -1]] - loops.time_s[index[:, 0]]) / (size - 1)
-    return _detrended(loops.force_N[index], loops.force_N[index].mean(axis=1), degree, dt)
+    return _detrended(loops.force_N[index], loops.force_N[index].mean(axis=1), degree, dt[:, None])
 
 
 def between_strokes(loops: Loops) -> Windows | None:
@@ -118,12 +124,36 @@ def between_strokes(loops: Loops) -> Windows | None:
     starts = np.repeat(first[pairs], counts, axis=0) + (margins + within)[:, None]
     rows = starts[:, :, None] + np.arange(size)
     difference = (loops.force_N[rows[:, 0]] - loops.force_N[rows[:, 1]]) / np.sqrt(2.0)
-    dt = (loops.time_s[rows[:, 0, -1]] - loops.time_s[rows[:, 0, 0]]) / (size - 1)
+    dt = np.sort(loops.time_s[rows[:, :, -1]] - loops.time_s[rows[:, :, 0]], axis=1) / (size - 1)
     return _detrended(difference, loops.force_N[rows].mean(axis=(1, 2)), DEGREE, dt)
 
 
 def _repeated(loops: Loops) -> Ints:
-    """Pairs (k, 2) of strokes of one level, branch and speed, each stroke in one at most."""
+    """Pairs (k, 2) of strokes that repeat each other, each stroke in one at most.
+
+    They have one level, one branch and one speed. Where each cycle has another speed there are none: then as
+    many readings at the same places will do, as their difference is a smooth one too.
+    """
+    pairs = _paired(loops, PACE)
+    return pairs if len(pairs) >= FEWEST_PAIRS else _in_place(loops, _paired(loops, np.inf))
+
+
+def _in_place(loops: Loops, pairs: Ints) -> Ints:
+    """Those pairs (k, 2) of strokes whose readings lie at the same places, but for a share of the stroke."""
+    first, length = loops.strokes
+    x = loops.displacement_m
+
+    def apart(one: int, other: int) -> float:
+        n = int(min(length[one], length[other]))
+        a, b = (x[first[s] + (length[s] - n) // 2 :][:n] for s in (one, other))
+        return float(np.abs(a - b).max() / max(np.ptp(a), 1e-12))
+
+    kept = [pair for pair in pairs.tolist() if apart(*pair) <= 1.0 / ALIKE]
+    return np.array(kept, dtype=np.int64).reshape(-1, 2)
+
+
+def _paired(loops: Loops, pace_apart: float) -> Ints:
+    """Pairs (k, 2) of strokes of one level and branch, whose paces (logarithms) are so far apart at most."""
     first, length = loops.strokes
     step = (loops.time_s[first + length - 1] - loops.time_s[first]) / np.maximum(length - 1, 1)
     groups: dict[tuple[int, int], list[tuple[int, float, int]]] = {}
@@ -136,7 +166,7 @@ def _repeated(loops: Loops) -> Ints:
         waiting: list[tuple[int, float, int]] = []
         for n, pace, stroke in sorted(group):
             waiting = [w for w in waiting if n - w[0] <= max(1, n // ALIKE)]
-            other = next((w for w in waiting if abs(pace - w[1]) <= PACE), None)
+            other = next((w for w in waiting if abs(pace - w[1]) <= pace_apart), None)
             if other is None:
                 waiting.append((n, pace, stroke))
             else:
@@ -146,8 +176,9 @@ def _repeated(loops: Loops) -> Ints:
 
 
 def _detrended(windows: Array, force: Array, degree: int, dt: Array) -> Windows:
-    """Windows (k, size) less a polynomial, with their mean forces and time steps (k,)."""
+    """Windows (k, size) less a polynomial, with their mean forces (k,) and time steps (k, 1 or 2)."""
     size = windows.shape[1]
     full, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, size), degree + 1), mode="complete")
     contrast = np.asarray(full[:, degree + 1 :], dtype=np.float64)
-    return Windows(windows @ contrast, force, contrast, np.maximum(dt, 1e-9))
+    steps = np.broadcast_to(np.maximum(dt, 1e-9), (len(windows), 2))
+    return Windows(windows @ contrast, force, contrast, steps)

@@ -225,11 +225,17 @@ def fast_noise_log_likelihood(
     scatter: tuple[Array, int, Array, float], averaged: int, white: Array, correlated: Array, time: Array
 ) -> Array:
     """Log-likelihood (B,) of the scatter inside bins under white + AR(1) noise."""
-    total, chunks, contrast, _ = scatter
-    projected = fast_noise_covariance(scatter, averaged, white, correlated, time)
-    factor = np.linalg.cholesky(projected)
+    total, chunks, _, _ = scatter
+    return scatter_log_likelihood(
+        total, chunks, fast_noise_covariance(scatter, averaged, white, correlated, time)
+    )
+
+
+def scatter_log_likelihood(total: Array, chunks: int, covariance: Array) -> Array:
+    """Log-likelihood (B,) of so many chunks with the sum of squares ``total`` (dof, dof), given a covariance
+    (B, dof, dof) of each."""
+    factor = np.linalg.cholesky(covariance)
     log_det = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)
-    trace = np.trace(np.linalg.solve(projected, total[None]), axis1=1, axis2=2)
-    dof = contrast.shape[1]
-    result: Array = -0.5 * (chunks * (log_det + dof * np.log(2.0 * np.pi)) + trace)
+    trace = np.trace(np.linalg.solve(covariance, total[None]), axis1=1, axis2=2)
+    result: Array = -0.5 * (chunks * (log_det + len(total) * np.log(2.0 * np.pi)) + trace)
     return result

@@ -91,3 +91,34 @@ def test_noise_of_strokes_at_two_paces_is_told(by_reading: bool) -> None:
             rows = found.time / (found.reading or dt)
             off.append(np.log(_scatter(found.white, found.correlated, rows) / (0.5 * scatter)))
     assert np.max(np.abs(off)) < 0.3
+
+
+@pytest.mark.parametrize("ripple", [0.0, 5.0])
+def test_noise_is_told_where_each_cycle_has_a_pace_of_its_own(ripple: float) -> None:
+    """Its readings lie where those of other cycles lie: what comes back there is no noise.
+
+    By the strokes alone a ripple of the place passed for it, and slow noise was hardly seen.
+    """
+    specimen = specimen_of("develop-null-022")
+    loops = specimen.loops
+    assert loops is not None
+    time = np.cumsum(0.05 * 2.0 ** (loops.cycle - 1.0))
+    loops = replace(loops, time_s=time, began_s=np.zeros(len(time)))
+    x = loops.displacement_m
+    curve = 50.0 * (1.0 + loops.level) - 2e3 * x + 2.0 * loops.branch * (1.0 + 0.1 * loops.cycle)
+    curve = curve + ripple * np.sin(x / (0.6 * np.median(np.abs(np.diff(x)))))
+    keep = np.exp(-np.diff(time, prepend=time[0]) / 0.5)
+    off = []
+    for seed in range(4):
+        z = np.random.default_rng(seed).standard_normal((2, len(time)))
+        slow = z[0].copy()
+        for i in range(1, len(time)):
+            slow[i] = keep[i] * slow[i - 1] + np.sqrt(1.0 - keep[i] ** 2) * z[0, i]
+        force = curve + slow + z[1]
+        found = problem_of(replace(specimen, loops=replace(loops, force_N=force))).noise_level
+        assert found.total == pytest.approx(np.sqrt(2.0), rel=0.2)
+        for dt in (0.05, 0.4):
+            wanted = _scatter(1.0, 1.0, 0.5 / dt)
+            rows = found.time / (found.reading or dt)
+            off.append(np.log(_scatter(found.white, found.correlated, rows) / wanted))
+    assert np.max(np.abs(off)) < 0.3
