@@ -109,11 +109,11 @@ def between_strokes(loops: Loops) -> Windows | None:
     What the muscle does, and whatever is wrong with it, comes back in the next cycle; noise does not. A
     sampling clock that does not keep step with the drive leaves a smooth difference: the polynomial takes it.
     """
-    first, length = loops.strokes
     pairs = _repeated(loops)
     if len(pairs) < FEWEST_PAIRS:
         return None
-    rows_each = length[pairs].min(axis=1)
+    begins = np.array([pair.begins for pair in pairs])
+    rows_each = np.array([pair.rows for pair in pairs])
     # Long windows tell more than many: of strokes at two speeds the fast ones may be left out.
     size = min(LONG_WINDOW, int(np.quantile(rows_each, 0.5, method="higher")))
     if size < DEGREE + 4:
@@ -121,58 +121,69 @@ def between_strokes(loops: Loops) -> Windows | None:
     counts = rows_each // size
     within = np.concatenate([np.arange(n) for n in counts]) * size
     margins = np.repeat((rows_each - counts * size) // 2, counts)
-    starts = np.repeat(first[pairs], counts, axis=0) + (margins + within)[:, None]
+    starts = np.repeat(begins, counts, axis=0) + (margins + within)[:, None]
     rows = starts[:, :, None] + np.arange(size)
     difference = (loops.force_N[rows[:, 0]] - loops.force_N[rows[:, 1]]) / np.sqrt(2.0)
     dt = np.sort(loops.time_s[rows[:, :, -1]] - loops.time_s[rows[:, :, 0]], axis=1) / (size - 1)
     return _detrended(difference, loops.force_N[rows].mean(axis=(1, 2)), DEGREE, dt)
 
 
-def _repeated(loops: Loops) -> Ints:
-    """Pairs (k, 2) of strokes that repeat each other, each stroke in one at most.
+class Pair(NamedTuple):
+    """Two strokes that repeat each other: from which rows on, for how many, and how far ``apart`` they lie.
+
+    The last is the largest distance of two readings as a share of the stroke.
+    """
+
+    begins: tuple[int, int]
+    rows: int
+    apart: float
+
+
+def _repeated(loops: Loops) -> list[Pair]:
+    """Pairs of strokes that repeat each other, each stroke in one at most.
 
     They have one level, one branch and one speed. Where each cycle has another speed there are none: then as
     many readings at the same places will do, as their difference is a smooth one too.
     """
     pairs = _paired(loops, PACE)
-    return pairs if len(pairs) >= FEWEST_PAIRS else _in_place(loops, _paired(loops, np.inf))
+    return (
+        pairs if len(pairs) >= FEWEST_PAIRS else [p for p in _paired(loops, np.inf) if p.apart <= 1.0 / ALIKE]
+    )
 
 
-def _in_place(loops: Loops, pairs: Ints) -> Ints:
-    """Those pairs (k, 2) of strokes whose readings lie at the same places, but for a share of the stroke."""
-    first, length = loops.strokes
-    x = loops.displacement_m
-
-    def apart(one: int, other: int) -> float:
-        n = int(min(length[one], length[other]))
-        a, b = (x[first[s] + (length[s] - n) // 2 :][:n] for s in (one, other))
-        return float(np.abs(a - b).max() / max(np.ptp(a), 1e-12))
-
-    kept = [pair for pair in pairs.tolist() if apart(*pair) <= 1.0 / ALIKE]
-    return np.array(kept, dtype=np.int64).reshape(-1, 2)
-
-
-def _paired(loops: Loops, pace_apart: float) -> Ints:
-    """Pairs (k, 2) of strokes of one level and branch, whose paces (logarithms) are so far apart at most."""
+def _paired(loops: Loops, pace_apart: float) -> list[Pair]:
+    """Pairs of strokes of one level and branch, whose paces (logarithms) are so far apart at most."""
     first, length = loops.strokes
     step = (loops.time_s[first + length - 1] - loops.time_s[first]) / np.maximum(length - 1, 1)
     groups: dict[tuple[int, int], list[tuple[int, float, int]]] = {}
-    for stroke, (f, n) in enumerate(zip(first, length, strict=True)):
+    for f, n, dt in zip(first.tolist(), length.tolist(), step, strict=True):
         if not loops.censored[f : f + n].any():
-            own = (int(n), float(np.log(max(step[stroke], 1e-9))), stroke)
+            own = (n, float(np.log(max(dt, 1e-9))), f)
             groups.setdefault((int(loops.level[f]), int(loops.branch[f])), []).append(own)
-    pairs: list[tuple[int, int]] = []
+    pairs: list[Pair] = []
     for group in groups.values():
         waiting: list[tuple[int, float, int]] = []
-        for n, pace, stroke in sorted(group):
+        for n, pace, begin in sorted(group):
             waiting = [w for w in waiting if n - w[0] <= max(1, n // ALIKE)]
             other = next((w for w in waiting if abs(pace - w[1]) <= pace_apart), None)
             if other is None:
-                waiting.append((n, pace, stroke))
+                waiting.append((n, pace, begin))
             else:
                 waiting.remove(other)
-                pairs.append((other[2], stroke))
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+                pairs.append(_aligned(loops.displacement_m, (other[2], other[0]), (begin, n)))
+    return pairs
+
+
+def _aligned(x: Array, short: tuple[int, int], long: tuple[int, int]) -> Pair:
+    """Two strokes (begin and rows) side by side where their readings lie nearest to each other.
+
+    A test's first stroke may lack the reading of the turn that others begin with.
+    """
+    (begin, n), (other, m) = short, long
+    own = x[begin : begin + n]
+    apart = np.abs(np.lib.stride_tricks.sliding_window_view(x[other : other + m], n) - own)
+    offset = int(np.argmin(apart.mean(axis=1)))
+    return Pair((begin, other + offset), n, float(apart[offset].max() / max(np.ptp(own), 1e-12)))
 
 
 def _detrended(windows: Array, force: Array, degree: int, dt: Array) -> Windows:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from rig import recipes, sets
 
+from mpam_calib.criticism.noise_windows import between_strokes
+
 from .test_hypotheses import problem_of, specimen_of
 
 CURVED = ("develop-separable-006", "develop-separable-022", "develop-null-009", "develop-null-015")
@@ -122,3 +124,18 @@ def test_noise_is_told_where_each_cycle_has_a_pace_of_its_own(ripple: float) -> 
             rows = found.time / (found.reading or dt)
             off.append(np.log(_scatter(found.white, found.correlated, rows) / wanted))
     assert np.max(np.abs(off)) < 0.3
+
+
+def test_strokes_are_compared_where_their_readings_lie_at_one_place() -> None:
+    """A level's first stroke may lack the reading of the turn: a steep curve is then no noise, either."""
+    loops = specimen_of("develop-null-022").loops
+    assert loops is not None
+    begins = np.flatnonzero(np.diff(loops.level, prepend=-1))
+    lacking = np.zeros(len(loops.time_s), dtype=bool)
+    lacking[begins] = True
+    x = loops.displacement_m / loops.displacement_m.max()
+    loops = replace(loops, force_N=100.0 * np.exp(-3.0 * x)).without(lacking)
+    windows = between_strokes(loops)
+    assert windows is not None
+    step = np.abs(np.diff(x)).max()
+    assert np.abs(windows.chunks).max() < 0.02 * 300.0 * step
