@@ -20,7 +20,7 @@ NEXT = 5
 CROWDED, BELOW = 2.0, 5
 """Readings about a ceiling, in those about a place next to it, of which so many are looked at."""
 WITHIN = 3.0
-"""Noise sds about a ceiling."""
+"""Noise sds about a ceiling within which a reading may be one of it."""
 FEWEST = 3
 """Readings of a stroke that tell whether it runs along the ceiling."""
 BESIDE = 1.5
@@ -58,7 +58,9 @@ def along_a_ceiling(loops: Loops, noise: float) -> Bools:
     ceiling = _crowd(loops.force_N[~loops.censored], noise)
     if ceiling is None:
         return np.zeros(len(loops.force_N), dtype=bool)
-    return _strokes_along(loops, ceiling, noise)
+    found = _strokes_along(loops, ceiling, noise)
+    # Once it is shown, single readings at the ceiling are as wrong as those of strokes along it.
+    return found | (loops.force_N > ceiling - WITHIN * noise) if found.any() else found
 
 
 def _crowd(force: Array, noise: float) -> float | None:
