@@ -91,6 +91,8 @@ CONVENTIONS: dict[str, Form] = {
     for form in (
         # The cell is tared before each file (which then has a clock of its own).
         _by("tared", "force_drift", _zero(lambda rows: rows.level_time / 60.0)),
+        # The cell is tared when the muscle is mounted, some time before the first reading.
+        _by("mounted_before", "force_drift", _zero(lambda rows: (rows.time + 45.0) / 60.0)),
         _by("there_and_back", "force_drift", _zero(_there_and_back)),
         # Rubber that softened at one level stays soft at the next.
         _by("softened_once", "stress_softening", _stiffer(lambda rows: 0.5 ** _cycles_before(rows))),

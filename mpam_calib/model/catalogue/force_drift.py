@@ -36,6 +36,17 @@ def _tared(state: State, values: Values, setting: Setting) -> State:
     return replace(state, zero=state.zero + values["drift_N_per_min"] * state.readings.file_time)
 
 
+def _early(state: State, values: Values, setting: Setting) -> State:
+    """The same line from when the cell was tared: some of it is over when the first reading is taken."""
+    path = state.readings.time + values["tared_before_s"]
+    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+
+
+def _before(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LogNormal(MINUTE, 1.0)
+    return (Parameter("tared_before_s", prior, "time from the taring to the first reading"),)
+
+
 def _power(state: State, values: Values, setting: Setting) -> State:
     """A power of time, as far at half the test: a half with diffusion of heat, 2 ever faster."""
     half = half_test(setting)
@@ -79,12 +90,14 @@ register(
         forms={
             "settling": _settling,
             "tared": _tared,
+            "early": _early,
             "power": _power,
             "thermal": _thermal,
             "return": _return,
         },
-        own={"power": _exponent, "thermal": _time},
+        own={"early": _before, "power": _exponent, "thermal": _time},
         sources={
+            "early": "the same line, from before the first reading",
             "power": "textbook: square root of time (heat conduction), quadratic",
             "thermal": "textbook: Newton's law of cooling, 1 − exp(−t/τ)",
             "return": "textbook: half a period of a sine over the test",
