@@ -47,8 +47,8 @@ NO_SIZE = {"mean": np.nan, "q05": np.nan, "q95": np.nan}
 
 FORMS = (
     "These probabilities suppose that a rig's effects follow the catalogue's equations, bent ones too, "
-    "to a few per cent. On hidden test cases sets stated at more than 0.99 were the true ones in four of "
-    "five, and in five of eight where a cause had a form that the catalogue does not have. Try a named cause "
+    "to a few per cent. On hidden test cases sets stated at more than 0.99 were the true ones in five of "
+    "six, and in two of three where a cause had a form that the catalogue does not have. Try a named cause "
     "on the rig before you rely on it."
 )
 
