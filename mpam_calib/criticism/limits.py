@@ -25,8 +25,8 @@ STEPS, WIDEST = 4.0, 0.1
 """Points per posterior sd, and their largest distance (prior sds): near a bound a density is no parabola."""
 DEPTH = 9.0
 """Nats below the highest point at which the density counts for nothing."""
-MOST_POINTS, FINE = 400, 2000
-"""Points at which the density is looked at on either side, and between which it is interpolated."""
+FEWEST, MOST_POINTS, FINE = 3, 400, 2000
+"""Points at which the density is looked at, in all and on either side, and that are interpolated."""
 EXCLUDED = 5.0
 """Nats behind the best kind of an effect (whose clock, which force) from which on a kind is left out."""
 
@@ -62,12 +62,13 @@ def _band(problem: Problem, form: str) -> tuple[float, Band] | None:
     chain = chain_for(problem.blueprint.model_dump_json(), frozenset([form]))
     climb = Climb(problem, chain, 0, np.empty((len(problem), 0)))
     try:
-        mode = climb.climb(np.zeros(len(climb.names)), climb.guide(), np.zeros(chain.linear_size))
-    except np.linalg.LinAlgError:
+        with np.errstate(over="ignore", invalid="ignore"):  # of shapes that no muscle has
+            mode = climb.climb(np.zeros(len(climb.names)), climb.guide(), np.zeros(chain.linear_size))
+            points, found = _walk(climb, mode, climb.names.index(own.name))
+    except (np.linalg.LinAlgError, ValueError):  # scipy's word for slopes that are not finite
         return None
-    if not np.isfinite(mode.objective):
+    if len(points) < FEWEST:
         return None
-    points, found = _walk(climb, mode, climb.names.index(own.name))
     u = np.linspace(points[0], points[-1], FINE)
     log_density = interpolate.PchipInterpolator(points, found)(u)
     top = float(log_density.max())
@@ -83,8 +84,7 @@ def _walk(climb: Climb, mode: Place, i: int) -> tuple[Array, Array]:
     covariance = linalg.inv(J.T @ J + np.eye(J.shape[1]))
     step = min(float(np.sqrt(covariance[i, i])) / STEPS, WIDEST)
     furthest = float(furthest_of(climb.chain.parameters)[i])
-    found = {float(mode.u[i]): _log_density(climb, mode, i)}
-    top = max(found.values())
+    found = {float(mode.u[i]): (top := _log_density(climb, mode, i))}
     for direction in (-step, step):
         place = mode
         for _point in range(MOST_POINTS):
@@ -93,10 +93,12 @@ def _walk(climb: Climb, mode: Place, i: int) -> tuple[Array, Array]:
             if abs(u[i]) > furthest:
                 break
             place = climb.look_with_its_signs(u, place.guide, place.eta)
+            if not np.isfinite(place.objective):  # no muscle
+                break
             place = _eased(climb, place, i)
             found[float(u[i])] = value = _log_density(climb, place, i)
             top = max(top, value)
-            if not value > top - DEPTH:
+            if value < top - DEPTH:
                 break
     u = np.array(sorted(found))
     return u, np.array([found[x] for x in u])
