@@ -53,7 +53,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "force_drift": (
         *("bent", "settling", "settling-bent", "tared", "tared-bent"),
-        *("power", "thermal", "return"),
+        *("early", "power", "thermal", "return"),
     ),
     "pressure_droop": ("bent", "level", "level-bent", "power", "level-power", "speed"),
     "rig_compliance": ("bent", "power", "toe"),
