@@ -46,20 +46,14 @@ def si_factor(name: str) -> float:
     return 1.0
 
 
-STATIC_FRICTION = "f_s"
-"""The coefficient of friction of the strands (thesis Eq. 2.43), in no seconds."""
-
-
 def unit_of(name: str) -> str:
     """The unit that a column or parameter name ends in, in print form ("" without one).
 
     >>> unit_of("drift_N_per_min")
     'N/min'
-    >>> unit_of("K_f"), unit_of("f_s")
-    ('', '')
+    >>> unit_of("K_f")
+    ''
     """
-    if name.partition("@")[0] == STATIC_FRICTION:
-        return ""
     for suffix in sorted(_SUFFIXES, key=len, reverse=True):
         if name.endswith(suffix):
             return suffix[1:].replace("_per_", "/").replace("deg", "°").replace("percent", "%")

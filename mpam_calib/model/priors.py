@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
+from mpam_calib.units import unit_of
+
 Array = NDArray[np.float64]
 
 _FAR = 8.0
@@ -315,3 +317,8 @@ class Parameter:
     source: str = ""
     unit: str | None = None
     """Printed unit where the name does not carry it."""
+
+    @property
+    def printed_unit(self) -> str:
+        """The unit in print: an f_s is no number of seconds."""
+        return unit_of(self.name) if self.unit is None else self.unit

@@ -12,7 +12,7 @@ from mpam_calib.posterior.batch import batch_size
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.pool import held_target, workers
 from mpam_calib.posterior.sampling import Sampling
-from mpam_calib.units import KPA, si_factor, unit_of
+from mpam_calib.units import KPA, si_factor
 
 Array = NDArray[np.float64]
 
@@ -87,9 +87,14 @@ def reported(model: Model, draws: Draws, seed: int = 0) -> list[Reported]:
         if name.split("_")[0] in ("d", "gap") and parameter.unit == "1/kPa":
             found += _rate(model, draws, name, seed)
             continue
-        unit = unit_of(name) if parameter.unit is None else parameter.unit
         found.append(
-            Reported(name, unit, draws.values[name][:, 0] / factor, parameter.prior.sd / factor, True)
+            Reported(
+                name,
+                parameter.printed_unit,
+                draws.values[name][:, 0] / factor,
+                parameter.prior.sd / factor,
+                True,
+            )
         )
     return found
 

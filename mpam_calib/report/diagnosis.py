@@ -28,7 +28,7 @@ from mpam_calib.report.page import (
     Verdict,
 )
 from mpam_calib.specimen.recording import Specimen
-from mpam_calib.units import KPA, unit_of
+from mpam_calib.units import KPA
 
 LEVELS: dict[str, Literal["good", "caution", "bad"]] = {
     "adequate": "good",
@@ -56,7 +56,7 @@ FORMS = (
 def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen) -> Page:
     """The page for one diagnosis; ``content`` is that of ``diagnosis.json``."""
     word = found.verdict.word
-    causes = content["causes"]
+    causes, units = content["causes"], _units(found)
     lead: list[Block] = [
         Headline(SENTENCES[word]),
         Verdict(_verdict_sentence(content), LEVELS[word], _reasons(content)),
@@ -72,8 +72,8 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
     sections = [
         Section("Misfit budget", _budget(found, content)),
         Section("Where the misfit shows", _structure(content)),
-        Section("Causes", _causes(causes)),
-        *([Section("What could hide unseen", _limits(content))] if content["limits"] else []),
+        Section("Causes", _causes(causes, units)),
+        *([Section("What could hide unseen", _limits(content, units))] if content["limits"] else []),
         Section("What else could it be", _alternatives(content, found.verdict.near())),
         Section("Gain on data the fit never saw", _gain(content)),
         Section("What these data cannot test", _not_tested(content)),
@@ -192,7 +192,15 @@ def _budget(found: Diagnosis, content: dict[str, Any]) -> list[Block]:
     ]
 
 
-def _causes(causes: list[dict[str, Any]]) -> list[Block]:
+def _units(found: Diagnosis) -> dict[str, str]:
+    """The unit of every size on the page, by its name."""
+    setting = found.problem.model.setting
+    assert setting is not None
+    forms = (*found.declared_forms, *found.limits)
+    return {p.name: p.printed_unit for form in forms for p in effect(form).parameters(setting)}
+
+
+def _causes(causes: list[dict[str, Any]], units: dict[str, str]) -> list[Block]:
     if not causes:
         return [Text("None is named.")]
     rows = [
@@ -204,7 +212,7 @@ def _causes(causes: list[dict[str, Any]]) -> list[Block]:
             "mean": values["mean"],
             "5 %": values["q05"],
             "95 %": values["q95"],
-            "unit": unit_of(name),
+            "unit": units.get(name, ""),
             "share of misfit": c["share_of_misfit"],
         }
         for c in causes
@@ -237,7 +245,7 @@ def _alternatives(content: dict[str, Any], near: int) -> list[Block]:
     return [Text(text), DataTable(pd.DataFrame(rows), "Other sets of causes", {"probability": "{}"})]
 
 
-def _limits(content: dict[str, Any]) -> list[Block]:
+def _limits(content: dict[str, Any], units: dict[str, str]) -> list[Block]:
     """How large each effect could be without being seen."""
     text = (
         "Nothing was found; that is not to say that nothing is there. Each effect by itself could have any "
@@ -250,7 +258,7 @@ def _limits(content: dict[str, Any]) -> list[Block]:
             "parameter": name,
             "5 %": band["q05"],
             "95 %": band["q95"],
-            "unit": unit_of(name),
+            "unit": units[name],
             "what would show it": effect(limit["id"]).told_by,
         }
         for limit in content["limits"]

@@ -56,9 +56,14 @@ def test_nothing_hidden_is_adequate_and_the_bytes_repeat(tmp_path: Path) -> None
     content = json.loads(first)
     assert (content["verdict"], content["causes"], content["gain"]) == ("adequate", [], None)
     # What could hide even so: sizes and names.
-    unseen = {limit["id"] for limit in content["limits"]}
-    assert unseen & {"length_offset", "creep"} <= {a for s in content["alternatives"] for a in s["ids"]}
-    assert "What could hide unseen" in (tmp_path / "first" / "report.html").read_text()
+    limits = {limit["id"]: limit["parameters"] for limit in content["limits"]}
+    assert {"length_offset", "strand_friction"} <= limits.keys()
+    assert {"length_offset"} <= {a for s in content["alternatives"] for a in s["ids"]}
+    assert all(band["q05"] < band["q95"] for bands in limits.values() for band in bands.values())
+    page = (tmp_path / "first" / "report.html").read_text()
+    assert "What could hide unseen" in page
+    assert ">mm</td>" in page
+    assert ">s</td>" not in page  # f_s is no time
     # What was declared and is not used is said on the page.
     assert "Heavy tails of the noise" in (tmp_path / "first" / "report.html").read_text()
 

@@ -136,7 +136,7 @@ def test_a_ceiling_is_seen_through_noise(name: str, share: float) -> None:
     found = along_a_ceiling(clipped, noise)
     assert not saturated(clipped).any()
     assert found.mean() == pytest.approx(share, abs=0.3 * share)
-    assert not np.any(found & ~above & (loops.force_N < limit - 4.0 * noise))
+    assert not np.any(found & ~above & (loops.force_N < limit - 3.0 * noise))
     # One reading at the end of a stroke is as wrong as twenty.
     assert np.sum(above & ~found) <= 0.02 * np.sum(above)
 
