@@ -149,11 +149,13 @@ class Search:
         part = max(parts, key=self.score)
         base = self._known(part, size)
         (new,) = effects - part
-        own = self._known(frozenset([new]), size)
         assert base is not None
-        forms = named_forms(base) | ({new: flexible(new)[0]} if own is None else named_forms(own))
+        # Beside others a cause takes the shape that it has; alone, one that makes up for what it lacks.
+        beside = [p for p in parts if new in p]
+        own = self._known(max(beside, key=self.score) if beside else frozenset([new]), size)
+        form = flexible(new)[0] if own is None else named_forms(own)[new]
         start = {} if own is None else {n: u for n, u in ended(own).items() if not is_bend(n)}
-        return forms, start | ended(base)
+        return named_forms(base) | {new: form}, start | ended(base)
 
     def _known(self, effects: Set, size: int) -> Fit | None:
         """The set's fit beside a remainder of this size, or of the size that suits it best."""

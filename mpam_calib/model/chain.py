@@ -72,8 +72,14 @@ class Unsigned(NamedTuple):
         # Coulomb's law goes by what the muscle itself pulls, not by what the load cell reads.
         pull = np.ones(1) if guide is None else np.sign(guide - self.beside)
         state = self.state
-        slope = state.gain * coulomb_factor(state.friction_gain * state.coulomb, state.sign, pull)
+        factor = coulomb_factor(state.friction_gain * state.coulomb, state.sign, pull)
+        slope = state.gain * (factor + _tightened(state))
         return Factors(slope * self.fixed + self.beside, slope, self.columns, self.beside)
+
+
+def _tightened(state: State) -> Array:
+    """Share of the force that friction adds in either direction."""
+    return np.asarray(state.tightening * (state.friction_gain * state.sign) ** 2)
 
 
 @dataclass(frozen=True)
@@ -176,6 +182,7 @@ class Chain:
         state = self._to_sensor(state, values)
         free = state.gain * free
         friction = state.friction_gain * state.coulomb * np.abs(free) * state.sign
+        friction = friction + _tightened(state) * free
         return np.asarray(free + friction + self._friction_beside(state) + state.zero)
 
     def _to_shape(self, values: Values, readings: Readings, guide: Array) -> State:
@@ -244,6 +251,7 @@ class Chain:
             lost=zero,
             sign=readings.sign[None, :],
             coulomb=zero,
+            tightening=zero,
             strand=zero,
             drag=zero,
             friction_gain=one,

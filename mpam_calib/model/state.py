@@ -60,7 +60,8 @@ class State:
     and, once solved, the ``shape``.
     statics: ``wall_factor`` on the thickness term, ``lost`` (N) to be subtracted.
     friction: ``sign`` s (fractions while it turns over), ``coulomb`` K and ``strand`` f_s, both times
-    ``friction_gain``, and ``drag`` (N), the same at any force and pressure.
+    ``friction_gain``, ``tightening``, the share of the force that friction adds whichever way the muscle
+    goes, and ``drag`` (N), the same at any force and pressure.
     history: ``wall_gain`` on the bladder's stress and ``gain`` on the whole force.
     sensor: ``zero`` (N), added to the reading.
     """
@@ -78,6 +79,7 @@ class State:
     lost: Array
     sign: Array
     coulomb: Array
+    tightening: Array
     strand: Array
     drag: Array
     friction_gain: Array

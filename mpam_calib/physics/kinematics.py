@@ -99,10 +99,11 @@ def with_longer_strands(shape: Shape, rest: Rest, kinematics: str, strain: Array
     longer = (1.0 + strain) ** 2
     T = np.minimum(sin2, SIN_LIMIT**2 * longer)
     T = T / (longer - T)
-    if kinematics != "inextensible_braid":
+    if kinematics == "constant_thickness":
         return Shape(shape.L, shape.R, shape.t, T)
     R = shape.R * np.sqrt(np.maximum(longer - sin2, 0.0) / (1.0 - sin2))
-    return Shape(shape.L, R, wall_at_constant_volume(shape.L, R, rest), T)
+    kept = kinematics == "braid_of_constant_thickness"
+    return Shape(shape.L, R, shape.t if kept else wall_at_constant_volume(shape.L, R, rest), T)
 
 
 def tip_shortened_length(L: Array, R: Array, rest: Rest, factor: Array) -> Array:
@@ -110,11 +111,18 @@ def tip_shortened_length(L: Array, R: Array, rest: Rest, factor: Array) -> Array
     return L - 2.0 * factor * (np.pi / 2.0 - 1.0) * (R - rest.R0)
 
 
+def shape_braid_of_constant_thickness(L: Array, rest: Rest) -> Shape:
+    """R from Eq. 2.10, t = t0, T from Eq. 4.15: a wall that keeps its thickness within the strands."""
+    R = radius_inextensible_braid(L, rest)
+    return Shape(L, R, rest.t0 + np.zeros_like(R), tan2_braid_angle(L, rest))
+
+
 SHAPES = {
     "inextensible_braid": shape_inextensible_braid,
     "constant_thickness": shape_constant_thickness,
+    "braid_of_constant_thickness": shape_braid_of_constant_thickness,
 }
-"""The two kinematics by their declared names."""
+"""The two kinematics by their declared names, and one that an effect asks for."""
 
 NEWTON_STEPS = 6
 FLATTEST = 0.1

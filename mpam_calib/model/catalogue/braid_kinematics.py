@@ -25,6 +25,11 @@ def _swell(state: State, values: Values, setting: Setting) -> State:
     return replace(_apply(state, values, setting), swell=np.maximum(values["braid_swell"], 0.05))
 
 
+def _thickness(state: State, values: Values, setting: Setting) -> State:
+    """The radius follows the strands and the wall still keeps its thickness."""
+    return replace(state, kinematics="braid_of_constant_thickness")
+
+
 def _factor(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("braid_swell", Normal(1.0, 0.1), "the radius's growth over Eq. 2.10's", "", ""),)
 
@@ -40,9 +45,12 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"swell": _swell},
+        forms={"swell": _swell, "thickness": _thickness},
         own={"swell": _factor},
-        sources={"swell": "Eq. 2.10 for strands a distance δ outside the wall: growth × (1 + δ/R0)"},
+        sources={
+            "swell": "Eq. 2.10 for strands a distance δ outside the wall: growth × (1 + δ/R0)",
+            "thickness": "Eq. 2.10 with the declared t0 at any length (Chou & Hannaford 1996)",
+        },
         bends={"contraction": 2},
     )
 )

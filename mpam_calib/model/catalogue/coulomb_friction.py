@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import HalfNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -36,6 +38,12 @@ def _share(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("constant_share", Normal(0.4, 0.3), "share that is the same at any force", "", ""),)
 
 
+def _capstan(state: State, values: Values, setting: Setting) -> State:
+    """Strands wound round the bladder: F·exp(μs), sinh μ = K_f, which lifts the loop's middle as well."""
+    lifted = np.sqrt(1.0 + values["K_f"] ** 2) - 1.0
+    return replace(_apply(state, values, setting), tightening=state.tightening + lifted)
+
+
 register(
     Effect(
         id="coulomb_friction",
@@ -50,9 +58,12 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"constant": _constant},
+        forms={"constant": _constant, "capstan": _capstan},
         own={"constant": _share},
-        sources={"constant": "K|F| + a constant dry friction (Chou & Hannaford 1996)"},
+        sources={
+            "constant": "K|F| + a constant dry friction (Chou & Hannaford 1996)",
+            "capstan": "friction of a wound rope (Euler 1769; Eytelwein 1808): F·exp(±μ), K_f = sinh μ",
+        },
         bends={"force": 1, "pressure": 2, "contraction": 1},
     )
 )

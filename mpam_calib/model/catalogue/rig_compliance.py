@@ -54,6 +54,24 @@ def _toe_force(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("toe_N", prior, "force that takes up the fixture's slack"),)
 
 
+def _preload(state: State, values: Values, setting: Setting) -> State:
+    """Stiff up to the preload of a bolted joint, which then opens; it gives as much at the force scale."""
+    scale, preload = setting.force_scale, values["preload_N"]
+    stretch = scale / np.maximum(scale - preload, CLOSED * scale)
+    beyond = np.sign(state.guide) * np.maximum(np.abs(state.guide) - preload, 0.0)
+    give = values["compliance_mm_per_N"] * stretch * beyond
+    return replace(state, displacement=state.displacement + give)
+
+
+CLOSED = 0.2
+"""Least share of the force scale over which an open joint gives, whatever its preload."""
+
+
+def _preload_force(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LogNormal(0.15 * setting.force_scale, 0.6)
+    return (Parameter("preload_N", prior, "force at which the fixture begins to give"),)
+
+
 register(
     Effect(
         id="rig_compliance",
@@ -66,11 +84,12 @@ register(
         apply=_apply,
         memory=False,
         uses_force=True,
-        forms={"power": _power, "toe": _toe},
-        own={"power": _exponent, "toe": _toe_force},
+        forms={"power": _power, "toe": _toe, "preload": _preload},
+        own={"power": _exponent, "toe": _toe_force, "preload": _preload_force},
         sources={
             "power": "Hertz 1882: give ∝ F^(2/3); textbook: F^m",
             "toe": "toe region of ropes and grips (Fung 1967): give ∝ 1 − exp(−F/F_toe)",
+            "preload": "preloaded bolted joint, which opens at its preload (Shigley 1963): give ∝ F − F_p",
         },
         bends={"force": 2},
     )
