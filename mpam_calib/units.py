@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 KPA: Final = 1e3
 """pascals in a kilopascal"""
@@ -15,6 +19,8 @@ DEG: Final = math.pi / 180.0
 """radians in a degree"""
 MINUTE: Final = 60.0
 """seconds in a minute"""
+DECIMALS: Final = 7
+"""More decimals than any two levels (kPa) need to be told apart."""
 
 _SUFFIXES: Final[dict[str, float]] = {
     "_kPa": KPA,
@@ -44,6 +50,21 @@ def si_factor(name: str) -> float:
         if name.endswith(suffix):
             return _SUFFIXES[suffix]
     return 1.0
+
+
+def level_labels(levels: Sequence[float] | NDArray[np.float64]) -> list[str]:
+    """Pressures (Pa) as names of parameters carry them: whole kPa, or decimals until they can be told apart.
+
+    >>> level_labels([50e3, 100e3])
+    ['50', '100']
+    >>> level_labels([12.5e3, 13.5e3])
+    ['12.5', '13.5']
+    """
+    for decimals in range(DECIMALS):
+        labels = [f"{level / KPA:.{decimals}f}" for level in levels]
+        if len(set(labels)) == len(labels):
+            return labels
+    raise ValueError(f"levels that are not apart: {levels}")
 
 
 def unit_of(name: str) -> str:

@@ -134,7 +134,7 @@ def _weigh(task: tuple[Ranked, int]) -> Weighed:
 def _bridged(ranked: Ranked, weighed: Weighed) -> Ranked:
     """The bridge's figure with its error where it is to be believed, or else the quadrature's without."""
     if not weighed.bridge.reliable:
-        return replace(ranked, log_evidence=weighed.quadrature)
+        return replace(ranked, log_evidence=weighed.quadrature, error=float("nan"))
     return replace(ranked, log_evidence=weighed.bridge.value, error=weighed.bridge.error)
 
 

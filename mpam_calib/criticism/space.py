@@ -18,19 +18,22 @@ def model_space(specimen: Specimen) -> list[Simulation]:
     """Every such simulation; the declared effects and the moduli's source are kept.
 
     A single modulus has the same exponential law whether rates are shared or not: it is there once.
-    Laws vary fastest and in the order of LAWS (:mod:`mpam_calib.criticism.ranking` relies on neither).
+    What a declared effect adds is not there a second time. Laws vary fastest and in the order of LAWS
+    (:mod:`mpam_calib.criticism.ranking` starts each from the one before).
     """
     declared = specimen.simulation
+    listed = declared.effect_ids
     frictions = ["none"]
     parts = [p for p in (specimen.loops, specimen.force_map) if p is not None]
     if any(np.any(p.branch == 1) and np.any(p.branch == -1) for p in parts):
         frictions = ["coulomb", "none"] + (["strand"] if specimen.braid is not None else [])
+    frictions = [f for f in frictions if f"{f}_friction" not in listed]
     orders: list[int] = list(ORDERS)
     laws = [law for law, needed in LAWS.items() if len(specimen.levels_Pa) >= needed]
     strains = ["engineering", "stretch"]
     if declared.moduli != "loops":
         orders, laws, strains = [declared.order], ["constant"], [declared.strain]
-    kinematics = ["inextensible_braid", "constant_thickness"]
+    kinematics = [*(["inextensible_braid"] if "braid_kinematics" not in listed else []), "constant_thickness"]
     twice = "exponential" if (declared.law, declared.order) == ("exponential_each", 1) else "exponential_each"
     return [
         declared.model_copy(

@@ -8,7 +8,7 @@ Without structure the sum of squares there is χ², so the p-value is calibrated
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -71,7 +71,8 @@ def structure_tests(problem: Problem, fitted: Fit) -> list[Structure]:
     taken = _basis(white(linearise(problem, fitted)[1]))
     residual = white(problem.force - fitted.force - fitted.doubt)
     residual = residual - taken @ (taken.T @ residual)
-    readings = problem.middle()
+    # Points without a loop have no level among their readings.
+    readings = replace(problem.middle(), level=problem.level)
     found = []
     for name, columns in AGAINST.items():
         if name in ("time", "time at the level", "cycle") and not problem.has_clock:

@@ -13,7 +13,7 @@ from mpam_calib.model.effect import Values
 from mpam_calib.model.priors import Parameter
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.state import Setting, State
-from mpam_calib.units import KPA
+from mpam_calib.units import level_labels
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class DeclaredFriction:
         stem = "K_f" if simulation.friction == "coulomb" else "f_s"
         if not simulation.friction_by_pressure:
             return [stem]
-        return [f"{stem}@{level / KPA:.0f}" for level in self.setting.levels]
+        return [f"{stem}@{label}" for label in level_labels(self.setting.levels)]
 
     def parameters(self) -> tuple[Parameter, ...]:
         """The factors' priors."""

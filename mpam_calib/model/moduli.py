@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.effect import Values
 from mpam_calib.model.priors import LogNormal, Normal, Parameter, Prior
-from mpam_calib.units import KPA
+from mpam_calib.units import KPA, level_labels
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -70,7 +70,7 @@ class Law:
         letters["exponential_each"] = letters["exponential"]
         orders = range(1, self.order + 1)
         if self.name == "free":
-            return [f"E_{k}@{level / KPA:.0f}" for level in self.levels for k in orders]
+            return [f"E_{k}@{label}" for label in level_labels(self.levels) for k in orders]
         return [f"{letter}_{k}" for letter in letters[self.name] for k in orders]
 
     def coefficient_units(self) -> list[tuple[str, float]]:

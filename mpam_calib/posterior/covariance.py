@@ -182,22 +182,16 @@ def _kinds(
     pad: NDArray[np.bool_], rows: Array, rough: Array, lag: Array, dt: Array
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """First stroke of each kind (K,), and the kind of each stroke (S,)."""
+    kind = np.full(len(pad), -1, dtype=np.int64)
     first: list[int] = []
-    kind = np.empty(len(pad), dtype=np.int64)
-    for s in range(len(pad)):
-        for number, f in enumerate(first):
-            if (
-                np.array_equal(pad[s], pad[f])
-                and abs(dt[s] / dt[f] - 1.0) <= ALIKE
-                and np.all(np.abs(rows[s] - rows[f]) <= np.maximum(ALIKE * rows[f], 1.0))
-                and np.all(np.abs(lag[s] - lag[f]) <= ALIKE * lag[f] + 2.0)
-                and np.max(np.abs(rough[s] - rough[f])) <= ALIKE
-            ):
-                kind[s] = number
-                break
-        else:
-            kind[s] = len(first)
-            first.append(s)
+    while (left := np.flatnonzero(kind < 0)).size:
+        f = left[0]  # all that are like the first stroke without a kind
+        alike = np.all(pad[left] == pad[f], axis=1) & (np.abs(dt[left] / dt[f] - 1.0) <= ALIKE)
+        alike &= np.all(np.abs(rows[left] - rows[f]) <= np.maximum(ALIKE * rows[f], 1.0), axis=1)
+        alike &= np.all(np.abs(lag[left] - lag[f]) <= ALIKE * lag[f] + 2.0, axis=(1, 2))
+        alike &= np.max(np.abs(rough[left] - rough[f]), axis=(1, 2)) <= ALIKE
+        kind[left[alike]] = len(first)
+        first.append(int(f))
     return np.array(first), kind
 
 

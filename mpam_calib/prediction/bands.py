@@ -118,7 +118,7 @@ def _table(quantity: str, pressures: Array, contractions: Array, branch: str, dr
     return pd.DataFrame(
         {
             "quantity": quantity,
-            # A level is a median of readings: a hundredth of a kPa is all it means.
+            # A level is a median of readings: a thousandth of a kPa is all it means.
             "pressure_kPa": np.round(pressure.ravel(), 3),
             "contraction": np.round(contraction.ravel(), 9),
             "branch": branch,

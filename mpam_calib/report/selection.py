@@ -57,8 +57,8 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
                 Text(
                     "Evidence of the leading models is by bridge sampling, with its error; quadrature "
                     f"differs from it by at most {found.disagreement:.2g} nats. That of models with a rate "
-                    "for each modulus is known less well. Models without an error lie far below and have "
-                    "Laplace's approximation."
+                    "for each modulus is known less well. A model without an error lies far below and has "
+                    "Laplace's approximation, or its bridge is not to be relied on."
                 ),
             ],
         ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,11 @@ from rig.effects import shared_form
 from rig.recipes import Recipe, Wanted, build_case
 
 from criticism.test_hypotheses import problem_of, specimen_of
+from mpam_calib.criticism.fit import fit
 from mpam_calib.criticism.forms import flexible, forms_of, price
 from mpam_calib.criticism.refits import with_better_forms
 from mpam_calib.criticism.search import NEAR, POLISHED, Search, search
-from mpam_calib.criticism.spread import spread_over
+from mpam_calib.criticism.spread import Alone, spread_over
 from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.specimen import read
 
@@ -37,6 +39,23 @@ def test_a_kind_is_looked_for_beside_the_partner(tmp_path: Path) -> None:
     found = search(problem_of(read(tmp_path / "specimen")), (*sorted(PAIR), "length_offset", "wall_pressure"))
     assert found.sets[0] == PAIR
     assert found.fits[PAIR, found.best_size(PAIR)].effects == {"order_too_low", "stress_softening:force"}
+
+
+def test_beside_two_others_a_cause_has_the_form_that_it_had_beside_one() -> None:
+    """Alone, creep of the wall may make up for a bent law of pressure; beside the law it is what it is."""
+    problem = problem_of(specimen_of("develop-null-001"))
+    forms = [
+        ("creep:wall",), ("creep", "law_shape"), ("creep", "stress_softening:force"),
+        ("law_shape", "stress_softening:force"),
+    ]  # fmt: skip
+    fits = {frozenset(form.partition(":")[0] for form in f): fit(problem, frozenset(f), 0) for f in forms}
+    best = frozenset({"law_shape", "stress_softening"})
+    fits[best] = replace(fits[best], log_evidence=max(f.log_evidence for f in fits.values()) + 1.0)
+    tested = ("creep", "law_shape", "stress_softening")
+    found = Search(problem, tested, Alone(problem), fits={(s, 0): f for s, f in fits.items()})
+    ((tried, start), (again, nothing)) = found._tries(frozenset(tested), 0)
+    assert tried == again == ("creep", "law_shape", "stress_softening:force")
+    assert "creep_per_decade" in start and nothing == {}
 
 
 def undoubted(found: Search) -> Search:

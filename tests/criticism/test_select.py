@@ -132,6 +132,23 @@ def test_laws_in_play_are_those_that_the_levels_carry() -> None:
         assert {s.law for s in space.model_space(few)} == set(space.LAWS) - missing
 
 
+def test_what_an_effect_adds_is_not_there_twice() -> None:
+    """An extended model declares the friction and the kinematics that it found as effects."""
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
+    specimen = specimen_of(recipe.name)
+    plain = specimen.simulation.model_copy(update={"friction": "none", "kinematics": "constant_thickness"})
+    for listed, choice, gone in (
+        ("coulomb_friction", "friction", "coulomb"),
+        ("strand_friction:power", "friction", "strand"),
+        ("braid_kinematics", "kinematics", "inextensible_braid"),
+    ):
+        declared = plain.model_copy(update={"effects": (listed,)})
+        models = space.model_space(replace(specimen, simulation=declared))
+        values = {getattr(m, choice) for m in models}
+        assert gone not in values and getattr(plain, choice) in values
+        assert len({m.model_dump_json() for m in models}) == len(models)
+
+
 def test_without_replicates_there_is_no_confusion(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """And the page has its statement on orders, laws and levels all the same."""
     monkeypatch.setattr(space, "ORDERS", range(2, 4))

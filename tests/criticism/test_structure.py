@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
+from mpam_calib.criticism import structure
 from mpam_calib.criticism.bursts import bursts_rms
 from mpam_calib.criticism.converter import coarse_step
 from mpam_calib.criticism.fit import Fit, fit
@@ -17,7 +18,9 @@ from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.repeat import raw_residual, repeating_rms
 from mpam_calib.criticism.saturation import along_a_ceiling, saturated
 from mpam_calib.criticism.structure import structure_tests
+from mpam_calib.model.readings import Readings
 from mpam_calib.specimen import Specimen
+from mpam_calib.specimen.recording import BlockedForce
 
 from .test_hypotheses import problem_of, specimen_of
 
@@ -209,3 +212,20 @@ def test_a_converter_coarser_than_the_noise_is_seen(name: str, steps: float, see
     with_steps = float(np.hypot(noise, step / np.sqrt(12.0)))
     assert coarse_step(force, with_steps) == pytest.approx(step if seen else 0.0, rel=0.01)
     assert coarse_step(loops.force_N, noise) == 0.0
+
+
+def test_blocked_forces_belong_to_their_levels(specimen: Specimen, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They were held against the pressure as a level by themselves."""
+    levels = specimen.levels_Pa
+    blocked = BlockedForce(levels, np.linspace(10.0, 40.0, len(levels)), np.zeros(len(levels), dtype=bool))
+    problem = problem_of(replace(specimen, blocked_force=blocked))
+    grouped: list[Array] = []
+
+    def watch(readings: Readings) -> Array:
+        grouped.append(readings.level)
+        return np.empty((len(readings), 0))
+
+    monkeypatch.setitem(structure.AGAINST, "pressure", watch)
+    structure_tests(problem, fit(problem, frozenset(), 0))
+    assert len(grouped[0]) == len(problem_of(specimen)) + len(levels)
+    assert set(grouped[0]) == set(range(len(levels)))

@@ -14,6 +14,7 @@ from mpam_calib.model.effect_ids import forms_of_id
 from mpam_calib.model.moduli import Law, ModuliBlock
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.state import Setting, State
+from mpam_calib.physics.kinematics import SHAPES
 from mpam_calib.units import si_factor, unit_of
 
 from . import build
@@ -265,3 +266,40 @@ def test_friction_at_any_force_is_chou_and_hannaford_s() -> None:
     state = effect("coulomb_friction:constant").apply(start(setting, rows(setting)), values, setting)
     np.testing.assert_allclose(state.coulomb, 0.0, atol=1e-15)
     np.testing.assert_allclose(state.drag, 0.1 * setting.force_scale)
+
+
+@pytest.mark.parametrize("s", [-1.0, 0.0, 1.0])
+def test_a_capstan_multiplies_the_force_by_an_exponential(s: float) -> None:
+    """Whichever way the strands slip; at rest there is no friction."""
+    angle = 0.3
+    setting = setting_for("coulomb_friction:capstan")
+    values = {"K_f": np.array([[np.sinh(angle)]]), "f_s": np.zeros((1, 1))}
+    at = replace(rows(setting), sign=np.full(60, s))
+    bare = force(without(setting), {"f_s": np.zeros((1, 1))}, at)
+    np.testing.assert_allclose(force(setting, values, at), np.exp(angle * s) * bare, rtol=1e-12)
+    law = Law("constant", len(MODULI), setting.levels)
+    chain = Chain(setting, ModuliBlock(law, 0.0, mean=MODULI, root=np.zeros((len(MODULI), 1))), False)
+    found = chain.terms(values, at, bare[0])
+    np.testing.assert_allclose(found.fixed, np.exp(angle * s) * bare, rtol=1e-12)
+
+
+def test_a_wall_that_keeps_its_thickness_lies_within_the_strands() -> None:
+    setting = setting_for("braid_kinematics:thickness")
+    state = effect("braid_kinematics:thickness").apply(start(setting, rows(setting)), {}, setting)
+    rest = state.rest
+    shape = SHAPES[state.kinematics](rest.L0 * np.array([1.0, 0.9, 0.8]), rest)
+    np.testing.assert_allclose(shape.t, rest.t0 + np.zeros((1, 3)))
+    np.testing.assert_allclose(shape.R[:, :1], rest.R0)
+    # The strands' length stays: L² + (2πN R)² with R0 tan α0 for L0 / (2πN).
+    turned = rest.L0 / (rest.R0 * np.tan(rest.alpha0))
+    strands = np.hypot(shape.L, turned * shape.R)
+    np.testing.assert_allclose(strands, strands[:, :1] + np.zeros((1, 3)))
+
+
+def test_a_preloaded_fixture_is_stiff_up_to_its_preload() -> None:
+    setting = setting_for("rig_compliance:preload")
+    scale = setting.force_scale
+    values = {"compliance_mm_per_N": np.array([[1e-5]]), "preload_N": np.array([[0.2 * scale]])}
+    held = replace(start(setting, rows(setting, 4)), guide=scale * np.array([[0.1, 0.2, 0.6, 1.0]]))
+    moved = effect("rig_compliance:preload").apply(held, values, setting).displacement - held.displacement
+    np.testing.assert_allclose(moved, 1e-5 * scale * np.array([[0.0, 0.0, 0.5, 1.0]]), atol=1e-15)

@@ -15,6 +15,7 @@ from mpam_calib.model.readings import Readings
 from mpam_calib.model.reference import GRID_POINTS, geometric_contraction
 from mpam_calib.posterior.draws import Draws, reported
 from mpam_calib.specimen.recording import BlockedForce
+from mpam_calib.units import level_labels
 
 from . import build
 
@@ -247,3 +248,20 @@ def test_rates_that_no_walker_should_have_still_give_a_force(law: str) -> None:
     assert kept.any(axis=1).all()
     wanted = np.where(kept[:, :, None] & kept[:, None, :], np.eye(transform.shape[1]), 0.0)
     np.testing.assert_allclose(gram, wanted, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("levels", "labels"),
+    [((100.0, 150.0), ["100", "150"]), ((12.5, 13.5, 14.5, 15.5), ["12.5", "13.5", "14.5", "15.5"])],
+)
+def test_every_level_has_parameters_of_its_own(levels, labels):
+    """Levels that round to the same kilopascal shared one factor."""
+    declared = {"law": "free", "order": 1, "friction": "coulomb", "friction_by_pressure": True}
+    model = build_model(build.blueprint(declared, recorded=build.loops(levels)))
+    assert [n for n in model.names if n.startswith("K_f")] == [f"K_f@{label}" for label in labels]
+    assert model.moduli.law.coefficient_names() == [f"E_1@{label}" for label in labels]
+
+
+def test_levels_that_are_the_same_have_no_labels():
+    with pytest.raises(ValueError, match="not apart"):
+        level_labels([1e5, 1e5])

@@ -111,8 +111,8 @@ register(
         sources={
             "fung": "exponential hardening (Fung 1967); Ogden 1972 to the same order",
             "gent": "limiting extensibility, 1/(1 − J/J_m) with J ∝ e² (Gent 1996, doi:10.5254/1.3538357)",
-            "steady": "Mooney-Rivlin or Yeoh 1993 term with a constant modulus",
         },
+        kinds={"steady": "here by a modulus that is the same at any pressure"},
         bends={"contraction": 4},
         looseness=2.0,
     )
