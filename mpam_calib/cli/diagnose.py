@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +23,7 @@ def diagnose(
 
     with stage_progress() as tell:
         found = diagnose_to_folder(specimen, output, seed=seed, tell=tell)
-    causes = ", ".join(found.causes)
-    print(f"{found.verdict.word}{': ' + causes if causes else ''}")
-    print(f"{output / 'report.html'} written")
+    said = json.loads((output / "diagnosis.json").read_text(encoding="utf-8"))
+    causes = ", ".join(cause["id"] for cause in said["causes"])
+    print(f"{said['verdict']}{': ' + causes if causes else ''}")
+    print(f"{output / 'report.html'} {'written' if found else 'kept (same data, model and options)'}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -26,7 +27,11 @@ def predict(
     Writes bands on force, blocked force and free contraction to RUN/predictions.csv, with the columns
     of bands.csv; what lies beyond the data is marked there as extrapolated.
     """
+    from mpam_calib.run.folder import unconverged
     from mpam_calib.run.predict import parse_pressures, predict_to_folder
 
     pressures = None if pressure is None else parse_pressures(pressure)
-    print(predict_to_folder(run, pressures, seed))
+    written = predict_to_folder(run, pressures, seed)
+    if unconverged(run):
+        print(f"warning: {run} did not converge: its bands may be wrong until it has", file=sys.stderr)
+    print(written)

@@ -18,13 +18,16 @@ def select(
     replicates: Annotated[int, typer.Option(help="replicates of the confusion matrix (0: none)", min=0)] = 8,
 ) -> None:
     """Rank orders, laws, frictions, kinematics and strain conventions by evidence and held-out levels."""
+    import pandas as pd
+
     from mpam_calib.cli.progress import stage_progress
     from mpam_calib.report.selection import selection_sentence, short_name
     from mpam_calib.run.select import select_to_folder
 
     with stage_progress() as tell:
         found = select_to_folder(specimen, output, seed=seed, replicates=replicates, tell=tell)
-    best = found.models.iloc[0]
-    print(selection_sentence(found.models))
-    print(f"first of {len(found.models)}: {short_name(best)} (probability {best['probability']:.3g})")
-    print(f"{output / 'report.html'} written")
+    models = pd.read_csv(output / "models.csv", keep_default_na=False)
+    best = models.iloc[0]
+    print(selection_sentence(models))
+    print(f"first of {len(models)}: {short_name(best)} (probability {best['probability']:.3g})")
+    print(f"{output / 'report.html'} {'written' if found else 'kept (same data, model and options)'}")

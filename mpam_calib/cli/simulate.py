@@ -20,12 +20,13 @@ def simulate(
 ) -> None:
     """Write a specimen folder with synthetic recordings of the declared simulation."""
     from mpam_calib.prediction.simulate import simulate as make
-    from mpam_calib.run.synthetic import write_specimen
+    from mpam_calib.run.synthetic import demand_synthetic_folder, write_specimen
     from mpam_calib.specimen import read
 
     source = specimen / "specimen.toml" if specimen.is_dir() else specimen
     if output.resolve() == source.parent.resolve():
         raise InputError(output, "the specimen's own folder", "another folder")
+    demand_synthetic_folder(output)
     made = make(read(specimen, data_required=False), _sizes(hide or []), seed)
     write_specimen(made, source, output)
     print(output / "specimen.toml")

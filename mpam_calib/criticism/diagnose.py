@@ -58,7 +58,6 @@ class Diagnosis:
 def diagnose(
     specimen: Specimen,
     *,
-    seed: int = 0,
     material: MaterialPosterior | None = None,
     tell: Tell | None = None,
 ) -> Diagnosis:

@@ -29,13 +29,15 @@ def kept_for(ess_wanted: float) -> int:
 class Draws:
     """N draws, ensemble by ensemble: ``u`` (N, d) coordinates, ``values`` name → (N, 1) SI, ``eta`` (N, k).
 
-    ``chains`` is the number of ensembles; N is a multiple of it.
+    ``chains`` is the number of ensembles; N is a multiple of it. ``index`` (N / chains,) tells which of each
+    ensemble's draws they are, where they come straight from sampling.
     """
 
     u: Array
     values: dict[str, Array]
     eta: Array
     chains: int
+    index: NDArray[np.int64] | None = None
 
     def __len__(self) -> int:
         return len(self.u)
@@ -57,7 +59,7 @@ def keep_draws(target: Collapsed, sampling: Sampling, seed: int, kept: int | Non
     tasks = [(u[i : i + size], [seed, 1, i]) for i in range(0, len(u), size)]
     with workers(target, E) as pool:
         eta = np.concatenate(pool.map(_draw_back, tasks))
-    return Draws(u, target.model.values(u), eta, E)
+    return Draws(u, target.model.values(u), eta, E, keep)
 
 
 def _draw_back(task: tuple[Array, list[int]]) -> Array:

@@ -53,6 +53,8 @@ class Sampling:
     modes: list[Mode]
     acceptance: float
     warm_up_acceptance: list[float]
+    cut: bool = False
+    """Whether the budget ended it: with a larger one there would be other draws."""
 
     @property
     def converged(self) -> bool:
@@ -103,27 +105,31 @@ def sample(
             if checkpoint:
                 checkpoint.save("warm_up", warm)
         states = warm.states
-        steps = due = 0
+        steps, due = 0, BLOCK
         while True:
             name = f"block_{len(blocks):05d}"
-            block: list[Block] | None = checkpoint.load(name) if checkpoint else None
+            size = min(BLOCK, max_steps - steps)
+            # Only whole blocks are stored: one that this budget cuts short is drawn whole by a larger one.
+            store = checkpoint if size == BLOCK else None
+            block: list[Block] | None = store.load(name) if store else None
             if block is None:
-                block = run(states, warm.moves, min(BLOCK, max_steps))
-                if checkpoint:
-                    checkpoint.save(name, block)
+                block = run(states, warm.moves, size)
+                if store:
+                    store.save(name, block)
             states = [b.state for b in block]
             blocks.append(block)
-            steps += len(block[0].chain)
-            if steps < due and steps + BLOCK <= max_steps:
+            steps += size
+            if steps < min(due, max_steps):
                 continue
             chain = np.concatenate([np.stack([b.chain for b in part]) for part in blocks], axis=1)
             figures = diagnose_chains(chain)
             ess = float(min(figures.ess_bulk.min(), figures.ess_tail.min()))
+            in_time = steps >= due and size == BLOCK
             due = round(steps * min(max(PATIENCE[0], ess_wanted / ess), PATIENCE[1]))
             tell(Progress("sampling", steps, float(figures.rhat.max()), ess, min(ess / ess_wanted, 1.0)))
             enough = figures.meets(ess_wanted) and (warm.fits or steps >= LEAST)
-            if enough or steps + BLOCK > max_steps:
+            if enough or steps >= max_steps:
                 break
     log_prob = np.concatenate([np.stack([b.log_prob for b in part]) for part in blocks], axis=1)
     acceptance = float(np.mean([b.accepted for part in blocks for b in part]))
-    return Sampling(chain, log_prob, figures, warm.modes, acceptance, warm.accepted)
+    return Sampling(chain, log_prob, figures, warm.modes, acceptance, warm.accepted, not (enough and in_time))

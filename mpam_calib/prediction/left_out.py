@@ -43,10 +43,11 @@ RELIABLE = 0.7
 
 @dataclass(frozen=True)
 class _Held:
-    """Readings (n,) of one level, and their forces (N)."""
+    """Readings (n,) of one level, their forces (N), and of how many of the rig's each is the mean."""
 
     places: Readings
     force: Array
+    averaged: Array
 
 
 def levels_left_out(specimen: Specimen, target: Collapsed, draws: Draws, seed: int) -> pd.DataFrame:
@@ -71,7 +72,7 @@ def levels_left_out(specimen: Specimen, target: Collapsed, draws: Draws, seed: i
         u = _reweighted(fold, thinned, whole, rng)
         if u is None:
             continue
-        force, seen = _predict(fold, u, held.places, rng)
+        force, seen = _predict(fold, u, held, rng)
         low, high = np.quantile(seen, [0.05, 0.95], axis=0)
         miss = held.force - force.mean(axis=0)
         rows.append(
@@ -89,6 +90,7 @@ def _held(specimen: Specimen, target: Collapsed, level: int) -> _Held | None:
     """The level's readings that are not slack, evenly thinned; None without any."""
     places: list[Readings] = []
     force: list[Array] = []
+    averaged: list[Array] = []
     if (loops := specimen.loops) is not None:
         kept = (loops.level == level) & ~loops.censored
         if loops.unclear is not None:
@@ -96,16 +98,18 @@ def _held(specimen: Specimen, target: Collapsed, level: int) -> _Held | None:
         index = np.flatnonzero(kept)
         places.append(row_readings(loops).take(index))
         force.append(loops.force_N[index])
+        averaged.append(np.full(len(index), float(loops.averaged)))
     if (points := target.data.points) is not None:
         kept = (points.level(specimen.levels_Pa) == level) & ~points.censored
         index = np.flatnonzero(kept & (points.kind != KINDS.index("free_contraction")))
         places.append(points.readings.take(index))
         force.append(points.force[index])
+        averaged.append(np.ones(len(index)))
     everything, value = Readings.join(places), np.concatenate(force)
     if not len(value):
         return None
     some = np.unique(np.linspace(0, len(value) - 1, READINGS).round().astype(np.int64))
-    return _Held(everything.take(some), value[some])
+    return _Held(everything.take(some), value[some], np.concatenate(averaged)[some])
 
 
 def _likelihood(target: Collapsed, draws: Draws) -> Array:
@@ -133,7 +137,7 @@ def _reweighted(fold: Collapsed, draws: Draws, whole: Array, rng: np.random.Gene
     return proposed[rng.choice(PROPOSED, len(draws), p=np.exp(weight))]
 
 
-def _predict(fold: Collapsed, u: Array, places: Readings, rng: np.random.Generator) -> tuple[Array, Array]:
+def _predict(fold: Collapsed, u: Array, held: _Held, rng: np.random.Generator) -> tuple[Array, Array]:
     """Force (N, n) with all that the simulation may miss, and readings of it."""
     model, size = fold.model, batch_size(fold)
     assert model.setting is not None
@@ -141,7 +145,8 @@ def _predict(fold: Collapsed, u: Array, places: Readings, rng: np.random.Generat
     eta = np.concatenate(
         [fold.linear_draws(model.values(u[i : i + size]), rng) for i in range(0, len(u), size)]
     )
-    force = predict_force(model, values, eta, places)
+    force = predict_force(model, values, eta, held.places)
     if ROUGH in values:
         force = force + values[ROUGH] * rng.standard_normal(force.shape)
-    return force, force + ReadingNoise(values, model.setting.force_scale).draw(force, rng)
+    noise = ReadingNoise(values, model.setting.force_scale, held.averaged)
+    return force, force + noise.draw(force, rng)

@@ -19,14 +19,19 @@ FURTHEST = 100.0
 
 @dataclass(frozen=True)
 class ReadingNoise:
-    """Noise under N draws: ``values`` name → (N, 1), the force (N) at which a growth of one counts."""
+    """Noise under N draws: ``values`` name → (N, 1), the force (N) at which a growth of one counts.
+
+    A reading may be the mean of ``averaged`` of the rig's, one number or one for each place (n,): that is
+    less white noise, but as much of what lasts.
+    """
 
     values: Mapping[str, Array]
     force_scale: float
+    averaged: Array | float = 1.0
 
     def sd(self, force: Array) -> Array:
         """Standard deviation (N, ...), N, at forces (N, ...); of heavy-tailed noise, its scale."""
-        white = self._shaped(WHITE, force.ndim)
+        white = self._white(force.ndim)
         correlated = self._shaped(CORRELATED, force.ndim) if CORRELATED in self.values else 0.0
         return np.asarray(np.hypot(white, correlated) * self._growth(force))
 
@@ -37,10 +42,13 @@ class ReadingNoise:
             return self.sd(force) * normal
         dof = np.broadcast_to(self._shaped(FREEDOM, force.ndim), force.shape)
         tailed = np.clip(normal / np.sqrt(rng.chisquare(dof) / dof), -FURTHEST, FURTHEST)
-        white = self._shaped(WHITE, force.ndim) * tailed
+        white = self._white(force.ndim) * tailed
         if CORRELATED in self.values:
             white = white + self._shaped(CORRELATED, force.ndim) * rng.standard_normal(force.shape)
         return np.asarray(white * self._growth(force))
+
+    def _white(self, dimensions: int) -> Array:
+        return np.asarray(self._shaped(WHITE, dimensions) / np.sqrt(self.averaged))
 
     def _growth(self, force: Array) -> Array | float:
         if GROWTH not in self.values:

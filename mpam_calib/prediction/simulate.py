@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,10 @@ from mpam_calib.posterior.row_motion import row_readings
 from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.curves import contraction_grid, first_root
 from mpam_calib.prediction.protocol import LEVELS, thesis_protocol
+from mpam_calib.specimen.consistency import check_twice
+from mpam_calib.specimen.declaration import Simulation
 from mpam_calib.specimen.recording import ForceMap, Loops, Specimen
+from mpam_calib.specimen.toml_source import TomlSource
 from mpam_calib.units import si_factor
 
 Array = NDArray[np.float64]
@@ -27,6 +31,9 @@ THESIS_FRICTION = {"K_f": 0.0787, "f_s": 0.15}
 """Friction of a specimen without data: mean of thesis Table 4.10; the text to Fig. 4.20."""
 THESIS_FORCE_SD = 0.25
 """N; 0.1 % of the thesis's 250 N load cell."""
+FRICTIONS = {"coulomb_friction", "strand_friction"}
+OF_FRICTION = {"presliding", "rate_friction"}
+"""Effects that are a friction, and those that only change one."""
 TYPICAL = 1.0
 """Standard normal image of a hidden effect's default size: a large but ordinary draw of its prior."""
 FARTHEST = 6.0
@@ -47,8 +54,8 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
 
     With data: the mode fitted to them, at their rows. Without: the declared ``E_Pa`` and the thesis's
     protocol. ``hide`` maps effect ids to a size in lab units (None: a typical one). Raises
-    ``InputError`` for an id that is unknown, has no size to hide, or lacks what it needs, and for a size
-    that its prior all but rules out.
+    ``InputError`` for an id that is unknown, is part of the simulation, has no size to hide, or lacks what it
+    needs, and for a size that its prior all but rules out.
     """
     rng = np.random.default_rng([seed, 8])
     fitted = specimen.has_muscle_data
@@ -120,11 +127,8 @@ def _with_hidden(
             raise InputError(place, f"{identifier} without [braid]", "the strands' values in specimen.toml")
         if identifier in blueprint.simulation.effect_ids:
             raise InputError(place, f'"{identifier}"', "an effect that the simulation does not declare")
-        simulation = blueprint.simulation
-        effects = (*simulation.effects, identifier)
-        blueprint = blueprint.model_copy(
-            update={"simulation": simulation.model_copy(update={"effects": effects})}
-        )
+        simulation = _with_effect(blueprint.simulation, identifier, place)
+        blueprint = blueprint.model_copy(update={"simulation": simulation})
         setting = blueprint.setting()
         assert setting is not None
         parameters = item.parameters(setting)
@@ -138,13 +142,28 @@ def _with_hidden(
             )
             value = typical if size is None else size * factor
             if not smallest <= value <= largest:
-                expected = f"between {smallest / factor:.3g} and {largest / factor:.3g} {parameter.unit}"
-                raise InputError(place, f"{identifier}={size:g}", expected.strip())
+                bounds = f"between {smallest / factor:.3g} and {largest / factor:.3g}"
+                expected = f"{bounds} {parameter.printed_unit}".strip()
+                raise InputError(place, f"{identifier}={size:g}", expected)
             if parameter.name in values:
                 raise InputError(place, f'"{identifier}"', f"an effect without the declared {parameter.name}")
             values[parameter.name] = np.full((1, 1), value)
             hidden[identifier][parameter.name] = value / factor
+    rubs = blueprint.simulation.friction != "none" or FRICTIONS & set(blueprint.simulation.effect_ids)
+    for identifier in sorted(OF_FRICTION & hidden.keys()):
+        if not rubs:
+            raise InputError(place, f"{identifier} without friction", "a friction that it can change")
     return build_model(blueprint), hidden
+
+
+def _with_effect(simulation: Simulation, identifier: str, place: str) -> Simulation:
+    """The simulation with one more effect, refused where it is there under another name already."""
+    extended = simulation.model_copy(update={"effects": (*simulation.effects, identifier)})
+    try:
+        check_twice(TomlSource(Path(place), (), {}), extended)
+    except InputError as error:
+        raise InputError(place, error.found, "an effect that the simulation does not have") from None
+    return extended
 
 
 def _protocol(model: Model, values: dict[str, Array], eta: Array) -> Loops:
@@ -194,7 +213,8 @@ def _record(
     held = force if floor is None else np.maximum(force, floor)
     reading = held + _noise(held, dt, values, scale, rng)
     censored = np.zeros(len(force), dtype=bool) if floor is None else reading <= floor
-    return replace(loops, force_N=reading, censored=censored)
+    # Each row has the noise of one reading, whatever the rows stood for that it takes its place from.
+    return replace(loops, force_N=reading, censored=censored, averaged=1)
 
 
 def _record_map(

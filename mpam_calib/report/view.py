@@ -24,7 +24,6 @@ OBSERVED_COLUMNS = (
     "branch",
     "force_N",
     "fitted_N",
-    "sd_N",
     "cycle",
     "stroke",
     "time_s",
@@ -66,10 +65,9 @@ class CalibrationView:
     ``levels_kPa``: pressure levels, shape (levels,); empty for a tensile test. ``summary`` and
     ``bands`` have the columns of ``summary.csv`` and ``bands.csv``. ``observed`` has one row per
     reduced reading (``OBSERVED_COLUMNS``): kind is loops, force_map, blocked_force, free_contraction
-    or tensile; ``fitted_N`` is the posterior mean of the declared simulation *without* the remainder
-    and ``sd_N`` one sigma of a new reading about it (parameters, remainder and noise). A free
-    contraction has its reading in ``contraction``, and in ``fitted_N`` and ``sd_N`` contractions too;
-    a tensile reading has the strain in ``contraction`` and stresses in Pa in the columns of force.
+    or tensile; ``fitted_N`` is the posterior mean of the declared simulation *without* the remainder. A
+    free contraction has its reading in ``contraction``, and in ``fitted_N`` a contraction too; a tensile
+    reading has the strain in ``contraction`` and stresses in Pa in the columns of force.
 
     ``draws`` and ``prior_draws``: parameter name to draws, shape (draws,), for the names in
     ``headline`` (at most eight are shown). ``remainder`` is the root mean square of what the

@@ -8,9 +8,9 @@ from pathlib import Path
 from mpam_calib.calibration import calibrate
 from mpam_calib.model.blueprint import MaterialPosterior, Options
 from mpam_calib.posterior.convergence import ESS_WANTED
-from mpam_calib.posterior.sampling import BLOCK, MAX_STEPS, Listener, Progress
-from mpam_calib.run.files import demand_folder
-from mpam_calib.run.folder import REPORT, RunFolder, material_of, run_digest
+from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Progress
+from mpam_calib.run.files import RUN_FILE, demand_folder
+from mpam_calib.run.folder import REPORT, RunFolder, material_folder, material_of, run_digest
 from mpam_calib.specimen import Specimen, read
 
 
@@ -24,10 +24,8 @@ class Outcome:
 
 def resolve_material(specimen: Specimen) -> MaterialPosterior | None:
     """The posterior that ``moduli = "run:PATH"`` names (relative to the specimen's folder), if it does."""
-    moduli = specimen.simulation.moduli
-    if not moduli.startswith("run:"):
-        return None
-    return material_of((specimen.folder / moduli.removeprefix("run:").strip()).resolve())
+    folder = material_folder(specimen)
+    return None if folder is None else material_of(folder)
 
 
 def calibrate_to_folder(
@@ -57,11 +55,12 @@ def calibrate_to_folder(
         material=None if material is None else material.model_dump(),
     )
     folder = RunFolder(run, digest)
-    demand_folder(run)
+    demand_folder(run, replaces=RUN_FILE)
     state = folder.state()
     if state is not None and folder.complete():
         used = int(state["sampling"]["steps"])
-        if state["converged"] or max_steps < used + BLOCK:
+        cut = bool(state["sampling"].get("cut", False))
+        if max_steps <= used or (state["converged"] and not cut):
             return Outcome(bool(state["converged"]), kept=True)
     tell = listener or (lambda progress: None)
     tell(Progress("fitting", 0, float("nan"), 0.0, 0.0))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from pathlib import Path
 
@@ -13,20 +12,36 @@ from mpam_calib.posterior.checkpoint import write_atomically
 from mpam_calib.report.diagnosis import diagnosis_page
 from mpam_calib.run.calibrate import resolve_material
 from mpam_calib.run.files import demand_folder, write_json
+from mpam_calib.run.folder import keep_material, run_digest
+from mpam_calib.run.kept import Kept
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
 
+FILES = ("diagnosis.json", "report.html", "extended/specimen.toml")
 
-def diagnose_to_folder(source: Path, run: Path, *, seed: int = 0, tell: Tell | None = None) -> Diagnosis:
-    """Diagnose a specimen into a RUN folder; raises ``InputError`` before anything is written."""
+
+def diagnose_to_folder(
+    source: Path, run: Path, *, seed: int = 0, tell: Tell | None = None
+) -> Diagnosis | None:
+    """Diagnose a specimen into a RUN folder; None where it is kept, since it holds the same already.
+
+    Raises ``InputError`` before anything is written.
+    """
     specimen = read(source)
     demand_folder(run)
-    found = diagnose(specimen, seed=seed, material=resolve_material(specimen), tell=tell)
+    material = resolve_material(specimen)
+    digest = run_digest(specimen.digest, command="diagnose", seed=seed, material=material)
+    kept = Kept(run, digest, FILES)
+    if kept.finished():
+        return None
+    found = diagnose(specimen, material=material, tell=tell)
+    kept.begin()
     toml = source / "specimen.toml" if source.is_dir() else source
     write_extended(found, specimen, toml, run / "extended")
     content = describe(found, seed)
     diagnosis_page(found, content, specimen).write(run / "report.html")
     write_json(content, run / "diagnosis.json")
+    kept.finish()
     return found
 
 
@@ -35,11 +50,7 @@ def write_extended(found: Diagnosis, specimen: Specimen, toml: Path, folder: Pat
     document = tomlkit.parse(toml.read_text(encoding="utf-8-sig"))
     simulation = document.setdefault("simulation", tomlkit.table())
     simulation["effects"] = list(extended_effects(found))
-    moduli = str(simulation.get("moduli", ""))
-    if moduli.startswith("run:"):
-        # The path is relative to the specimen's folder; the extended one stands elsewhere.
-        target = (specimen.folder / moduli.removeprefix("run:").strip()).resolve()
-        simulation["moduli"] = f"run:{os.path.relpath(target, folder.resolve())}"
+    keep_material(document, specimen, folder)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for file in specimen.files:

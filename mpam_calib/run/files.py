@@ -13,13 +13,21 @@ from mpam_calib.errors import InputError
 from mpam_calib.posterior.checkpoint import write_atomically
 from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 
+RUN_FILE = "run.json"
+"""The mark of a finished calibration."""
+OWNERS = {SPECIMEN_FILE: "a specimen's folder", RUN_FILE: "a calibration's folder"}
 
-def demand_folder(path: Path) -> None:
-    """Raise ``InputError`` where results cannot be written to a folder, or would mix with a specimen."""
+
+def demand_folder(path: Path, replaces: str | None = None) -> None:
+    """Raise ``InputError`` where results cannot be written to a folder, or would mix with what others left.
+
+    ``replaces`` names the one of ``OWNERS`` whose folder may be written again.
+    """
     if path.exists() and not path.is_dir():
         raise InputError(path, "a file", "a folder to write into, or a new name")
-    if (path / SPECIMEN_FILE).exists():
-        raise InputError(path, "a specimen's folder", "one of its own for the run")
+    for name, owner in OWNERS.items():
+        if name != replaces and (path / name).exists():
+            raise InputError(path, owner, "one of its own for these results")
     there = next(folder for folder in (path.absolute(), *path.absolute().parents) if folder.exists())
     if not there.is_dir():
         raise InputError(there, "a file", "a folder to make the run in")

@@ -5,12 +5,14 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import tomlkit
 
 from mpam_calib.arviz_import import import_arviz
 from mpam_calib.calibration import Calibration
@@ -19,13 +21,16 @@ from mpam_calib.model.blueprint import Blueprint, MaterialPosterior
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.posterior.checkpoint import Checkpoint, sweep, write_atomically
 from mpam_calib.posterior.draws import Draws, reported
-from mpam_calib.run.files import write_csv, write_json
+from mpam_calib.run.files import RUN_FILE, write_csv, write_json
+from mpam_calib.specimen.recording import Specimen
 
 REPORT = "report.html"
-WRITTEN = ("run.json", "posterior.nc", "summary.csv", "bands.csv", REPORT)
+WRITTEN = (RUN_FILE, "posterior.nc", "summary.csv", "bands.csv", REPORT)
 """What a finished calibration leaves."""
 DERIVED = ("predictions.csv", "designs.csv", "designs.html")
 """What later commands add, and what goes when the posterior they came from goes."""
+NO_TEST = (0.0, 0.0)
+"""The strain range of moduli that no tensile test gave."""
 PACKAGES = ("mpam-calib", "arviz", "emcee", "numpy", "scipy", "pandas")
 
 
@@ -55,7 +60,7 @@ class RunFolder:
     def state(self) -> dict[str, Any] | None:
         """``run.json`` where it belongs to this digest, else None."""
         try:
-            content: dict[str, Any] = json.loads((self.path / "run.json").read_text(encoding="utf-8"))
+            content: dict[str, Any] = json.loads((self.path / RUN_FILE).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
         return content if content.get("digest") == self.digest else None
@@ -76,7 +81,7 @@ class RunFolder:
         write_csv(calibration.summary, self.path / "summary.csv")
         write_csv(bands, self.path / "bands.csv")
         write_posterior(calibration, self.path / "posterior.nc")
-        write_json(describe(calibration, self.digest), self.path / "run.json")
+        write_json(describe(calibration, self.digest), self.path / RUN_FILE)
 
 
 def _readable(posterior: Path) -> bool:
@@ -111,6 +116,7 @@ def describe(calibration: Calibration, digest: str) -> dict[str, Any]:
             "ensembles": ensembles,
             "walkers": walkers,
             "steps": steps,
+            "cut": sampling.cut,
             "parameters": list(calibration.model.names),
             "dimensions": dimensions,
             "acceptance": round(sampling.acceptance, 6),
@@ -138,10 +144,11 @@ def write_posterior(calibration: Calibration, path: Path) -> None:
         "coordinates": draws.u.reshape(*shape, -1),
         "linear_coordinates": draws.eta.reshape(*shape, -1),
     }
-    log_prob = calibration.sampling.log_prob
+    assert draws.index is not None
+    log_prob = calibration.sampling.log_prob.reshape(chains, -1)[:, draws.index]
     data = az.from_dict(
         posterior=posterior,
-        sample_stats={"lp": log_prob.reshape(chains, -1)},
+        sample_stats={"lp": log_prob},
         attrs={"inference_library": "emcee", "digest": calibration.specimen.digest},
     )
     coordinates = az.dict_to_dataset(sampler, library=None)
@@ -173,10 +180,10 @@ def load_run(path: Path) -> StoredRun:
     az = import_arviz()
 
     try:
-        state: dict[str, Any] = json.loads((path / "run.json").read_text(encoding="utf-8"))
+        state: dict[str, Any] = json.loads((path / RUN_FILE).read_text(encoding="utf-8"))
         blueprint = Blueprint.model_validate(state["blueprint"])
     except (OSError, ValueError, KeyError) as error:
-        raise InputError(path / "run.json", "no finished run", "a folder that calibrate wrote") from error
+        raise InputError(path / RUN_FILE, "no finished run", "a folder that calibrate wrote") from error
     try:
         data = az.from_netcdf(str(path / "posterior.nc"), engine="h5netcdf")
         stored = data["sampler_coordinates"]
@@ -189,18 +196,40 @@ def load_run(path: Path) -> StoredRun:
     return StoredRun(path, model, Draws(u, model.values(u), eta, chains), state)
 
 
+def unconverged(path: Path) -> bool:
+    """Whether a RUN says of itself that its sampling did not converge."""
+    try:
+        state: dict[str, Any] = json.loads((path / RUN_FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return state.get("converged") is False
+
+
+def material_folder(specimen: Specimen) -> Path | None:
+    """The RUN that ``moduli = "run:PATH"`` names (relative to the specimen's folder), if it does."""
+    moduli = specimen.simulation.moduli
+    if not moduli.startswith("run:"):
+        return None
+    return (specimen.folder / moduli.removeprefix("run:").strip()).resolve()
+
+
+def keep_material(document: tomlkit.TOMLDocument, specimen: Specimen, folder: Path) -> None:
+    """Let a specimen's declaration find the RUN of its moduli from another folder."""
+    if (target := material_folder(specimen)) is not None:
+        document["simulation"]["moduli"] = f"run:{os.path.relpath(target, folder.resolve())}"
+
+
 def material_of(path: Path) -> MaterialPosterior:
     """The moduli that a RUN found, for ``moduli = "run:..."``; raises ``InputError`` where it has none."""
     run = load_run(path)
     names = [f"E_{k}" for k in range(1, run.model.blueprint.simulation.order + 1)]
     listed = {item.name: item.draws for item in reported(run.model, run.draws)}
     if not set(names) <= set(listed):
-        raise InputError(path / "run.json", "moduli that depend on pressure", "a run with a constant law")
+        raise InputError(path / RUN_FILE, "moduli that depend on pressure", "a run with a constant law")
     draws = np.stack([listed[name] for name in names])
-    strain = run.model.blueprint.tensile_range or (0.0, 0.0)
     return MaterialPosterior(
         mean=tuple(float(v) for v in draws.mean(axis=1)),
         covariance=tuple(tuple(float(v) for v in row) for row in np.atleast_2d(np.cov(draws))),
-        strain_range=strain,
+        strain_range=run.model.blueprint.tensile_range or NO_TEST,
         convention=run.model.blueprint.simulation.strain,
     )

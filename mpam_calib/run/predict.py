@@ -26,7 +26,7 @@ AT_ONCE = 8
 
 
 def parse_pressures(text: str) -> Array:
-    """Pressures (kPa) of ``A:B:STEP`` B included whether or not a step ends there, or of a single ``A``.
+    """Pressures (kPa) of ``A:B:STEP``, B included whether or not a step ends there, or of a single ``A``.
 
     >>> parse_pressures("100:200:50").tolist()
     [100.0, 150.0, 200.0]

@@ -9,7 +9,11 @@ from mpam_calib.criticism.select import Selection, select
 from mpam_calib.report.selection import selection_page
 from mpam_calib.run.calibrate import resolve_material
 from mpam_calib.run.files import demand_folder, write_csv
+from mpam_calib.run.folder import run_digest
+from mpam_calib.run.kept import Kept
 from mpam_calib.specimen import read
+
+FILES = ("models.csv", "prior_sensitivity.csv", "report.html")
 
 
 def select_to_folder(
@@ -19,13 +23,24 @@ def select_to_folder(
     seed: int = 0,
     replicates: int = 8,
     tell: Callable[[str, float], None] | None = None,
-) -> Selection:
-    """Rank the model space into a RUN folder; raises ``InputError`` before anything is written."""
+) -> Selection | None:
+    """Rank the model space into a RUN folder; None where it is kept, since it holds the same already.
+
+    Raises ``InputError`` before anything is written.
+    """
     specimen = read(source)
     demand_folder(run)
     material = resolve_material(specimen)
+    digest = run_digest(
+        specimen.digest, command="select", seed=seed, replicates=replicates, material=material
+    )
+    kept = Kept(run, digest, FILES)
+    if kept.finished():
+        return None
     found = select(specimen, seed=seed, replicates=replicates, material=material, tell=tell)
+    kept.begin()
     write_csv(found.models, run / "models.csv")
     write_csv(found.sensitivity, run / "prior_sensitivity.csv")
     selection_page(found, specimen).write(run / "report.html")
+    kept.finish()
     return found

@@ -10,12 +10,20 @@ import tomlkit
 
 from mpam_calib.posterior.checkpoint import write_atomically
 from mpam_calib.prediction.simulate import Simulated
-from mpam_calib.run.files import write_csv, write_json
+from mpam_calib.run.files import demand_folder, write_csv, write_json
+from mpam_calib.run.folder import keep_material
 from mpam_calib.specimen.recording import BRANCH_WORDS, ForceMap, Loops
+from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 from mpam_calib.units import KPA, MM
 
 WORDS = {code: word for word, code in BRANCH_WORDS.items()}
 LOOPS, FORCE_MAP = "loops_synthetic.csv", "force_map_synthetic.csv"
+TRUTH = "truth.json"
+
+
+def demand_synthetic_folder(path: Path) -> None:
+    """Raise ``InputError`` where a synthetic specimen cannot be written; only another one is replaced."""
+    demand_folder(path, replaces=SPECIMEN_FILE if (path / TRUTH).exists() else None)
 
 
 def write_specimen(simulated: Simulated, source: Path, folder: Path) -> None:
@@ -29,6 +37,7 @@ def write_specimen(simulated: Simulated, source: Path, folder: Path) -> None:
         document.pop(table, None)
     files = tomlkit.table()
     specimen = simulated.specimen
+    keep_material(document, specimen, folder)
     if specimen.loops is not None:
         files["loops"] = LOOPS
         write_csv(_loops_table(specimen.loops, specimen.levels_Pa), folder / LOOPS)
@@ -41,9 +50,9 @@ def write_specimen(simulated: Simulated, source: Path, folder: Path) -> None:
         write_csv(tensile, folder / "tensile.csv")
     document["files"] = files
     text = "# SYNTHETIC: made by a simulation, not by a rig.\n" + tomlkit.dumps(document)
-    write_atomically(folder / "specimen.toml", lambda p: p.write_text(text, encoding="utf-8"))
+    write_atomically(folder / SPECIMEN_FILE, lambda p: p.write_text(text, encoding="utf-8"))
     truth = {"hidden": simulated.hidden, "parameters": simulated.parameters}
-    write_json(truth, folder / "truth.json")
+    write_json(truth, folder / TRUTH)
 
 
 def _loops_table(loops: Loops, levels: np.ndarray) -> pd.DataFrame:

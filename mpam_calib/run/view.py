@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.calibration import Calibration
 from mpam_calib.model.model import CONTRACTION_SD, Model
-from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
+from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
@@ -17,7 +17,7 @@ from mpam_calib.posterior.points import KINDS
 from mpam_calib.prediction.bands import stress_draws
 from mpam_calib.prediction.left_out import levels_left_out
 from mpam_calib.report.view import OBSERVED_COLUMNS, CalibrationView, Convergence
-from mpam_calib.run.folder import versions
+from mpam_calib.run.folder import NO_TEST, material_folder, unconverged, versions
 from mpam_calib.run.strain_range import strain_range_table
 from mpam_calib.specimen.oddities import oddities
 from mpam_calib.units import KPA
@@ -136,13 +136,25 @@ def _settings(calibration: Calibration) -> dict[str, str]:
 
 
 def _warnings(calibration: Calibration) -> list[str]:
-    blueprint = calibration.model.blueprint
-    warnings = oddities(calibration.specimen)
-    if blueprint.material is not None:
-        low, high = blueprint.material.strain_range
+    specimen, material = calibration.specimen, calibration.model.blueprint.material
+    warnings = oddities(specimen)
+    if material is None:
+        return warnings
+    if material.strain_range == NO_TEST:
+        warnings.append(
+            "The moduli come from another muscle's run: they are constants of its force curve, not of the "
+            "rubber."
+        )
+    else:
+        low, high = material.strain_range
         warnings.append(
             f"The moduli come from a tensile test between strains {low:g} and {high:g}; "
             "a wall strained otherwise is extrapolated."
+        )
+    if (folder := material_folder(specimen)) is not None and unconverged(folder):
+        warnings.append(
+            "The run that the moduli come from did not converge: they and their bands may be wrong. Run it "
+            "longer (--max-steps), then this again."
         )
     return warnings
 
@@ -155,25 +167,18 @@ def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
     squares: list[Array] = []
     if data.bins is not None:
         middle = data.bins.middle()
-        fitted, parameter_sd, left = _fit(calibration, draws, middle)
+        fitted, left = _fit(calibration, draws, middle)
         rough = float(np.mean(draws.values[ROUGH] ** 2)) if ROUGH in draws.values else 0.0
         frame = _frame("loops", middle, data.bins.force, data.bins.slack, calibration)
         frame["stroke"] = data.bins.segment
         frame["time_s"] = middle.time
         frame["cycle"] = middle.cycle
-        frames.append(
-            _close(
-                frame,
-                fitted,
-                np.sqrt(parameter_sd**2 + left + rough + _noise_square(calibration, draws, fitted)),
-            )
-        )
+        frame["fitted_N"] = fitted
+        frames.append(frame)
         squares.append((left + rough)[~data.bins.slack])
     if data.points is not None:
         readings = data.points.readings
-        fitted, parameter_sd, left = _fit(calibration, draws, readings)
-        own = _noise_square(calibration, draws, fitted, clock=False)
-        sd = np.sqrt(parameter_sd**2 + left + own)
+        fitted, left = _fit(calibration, draws, readings)
         for number, kind in enumerate(KINDS):
             rows = data.points.kind == number
             if not rows.any():
@@ -181,14 +186,12 @@ def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
             frame = _frame(
                 kind, readings.take(rows), data.points.force[rows], data.points.censored[rows], calibration
             )
-            frame = _close(frame, fitted[rows], sd[rows])
+            frame["fitted_N"] = fitted[rows]
             if kind == "free_contraction" and calibration.target.guide.slope is not None:
                 assert model.setting is not None
                 # Newtons to contraction along the curve's slope there.
                 slope = calibration.target.guide.slope[rows] * model.setting.geometry.L0
                 frame["fitted_N"] = frame["contraction"] - fitted[rows] / slope
-                length = float(np.mean(draws.values[CONTRACTION_SD] ** 2))
-                frame["sd_N"] = np.sqrt((sd[rows] / slope) ** 2 + length)
             frames.append(frame)
             squares.append(left[rows & ~data.points.censored])
     if data.tensile is not None and model.tensile is not None:
@@ -213,19 +216,8 @@ def _noise(draws: Draws) -> float:
     return float(np.sqrt(np.mean(square)))
 
 
-def _noise_square(calibration: Calibration, draws: Draws, force: Array, clock: bool = True) -> Array | float:
-    """Mean square (N²) of a reading's noise at forces (n,); without a clock its white part alone."""
-    square = draws.values[WHITE] ** 2
-    if clock and CORRELATED in draws.values:
-        square = square + draws.values[CORRELATED] ** 2
-    setting = calibration.model.setting
-    if GROWTH not in draws.values or setting is None:
-        return float(np.mean(square))
-    return np.asarray(np.mean(square * grown(draws.values[GROWTH], force, setting.force_scale) ** 2, axis=0))
-
-
-def _fit(calibration: Calibration, draws: Draws, readings: Readings) -> tuple[Array, Array, Array]:
-    """Mean and sd (n,) of the simulation without its remainder, and the remainder's mean square (n,).
+def _fit(calibration: Calibration, draws: Draws, readings: Readings) -> tuple[Array, Array]:
+    """Mean (n,) of the simulation without its remainder, and the remainder's mean square (n,).
 
     How the simulation and its remainder share what both can describe is arbitrary: here the simulation
     has all of it.
@@ -240,7 +232,7 @@ def _fit(calibration: Calibration, draws: Draws, readings: Readings) -> tuple[Ar
         taken = _taken_up(surface, _directions(model, draws, readings), _noise(draws))
         force = force + taken
         square = np.mean((surface - taken) ** 2, axis=0)
-    return force.mean(axis=0), force.std(axis=0), square
+    return force.mean(axis=0), square
 
 
 def _directions(model: Model, draws: Draws, readings: Readings) -> Array:
@@ -284,10 +276,6 @@ def _frame(
     )
 
 
-def _close(frame: pd.DataFrame, fitted: Array, sd: Array) -> pd.DataFrame:
-    return frame.assign(fitted_N=fitted, sd_N=sd)
-
-
 def _tensile_frame(calibration: Calibration, draws: Draws) -> tuple[pd.DataFrame, Array]:
     """The tensile readings beside the law, and the remainder's mean square (n,); see ``_fit``."""
     tensile, model = calibration.target.data.tensile, calibration.model
@@ -307,7 +295,6 @@ def _tensile_frame(calibration: Calibration, draws: Draws) -> tuple[pd.DataFrame
             "branch": "",
             "force_N": tensile.stress,
             "fitted_N": stress.mean(axis=0),
-            "sd_N": np.sqrt(stress.var(axis=0) + left + noise),
             "censored": False,
         }
     )

@@ -33,6 +33,13 @@ def test_the_hidden_causes_are_named(runs: tuple[Path, frozenset[str]]) -> None:
     assert sum(cause["share_of_misfit"] for cause in content["causes"]) == pytest.approx(1.0, abs=0.1)
 
 
+def test_the_same_again_is_kept(runs: tuple[Path, frozenset[str]]) -> None:
+    specimen, files = runs[0].parent / "specimen", ("diagnosis.json", "report.html")
+    before = [(runs[0] / name).stat().st_mtime_ns for name in files]
+    assert diagnose_to_folder(specimen, runs[0]) is None
+    assert [(runs[0] / name).stat().st_mtime_ns for name in files] == before
+
+
 def test_the_gain_is_measured_on_levels_left_out(runs: tuple[Path, frozenset[str]]) -> None:
     gain = json.loads((runs[0] / "diagnosis.json").read_text())["gain"]
     assert gain["rmse_after_N"] < 0.5 * gain["rmse_before_N"]

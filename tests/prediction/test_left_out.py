@@ -12,6 +12,7 @@ from mpam_calib.calibration import Calibration, calibrate
 from mpam_calib.model.blueprint import Options
 from mpam_calib.posterior.target import predict_force
 from mpam_calib.prediction.left_out import COLUMNS, levels_left_out
+from mpam_calib.specimen.declaration import Sensors
 from mpam_calib.specimen.recording import Specimen
 
 from .coverage import as_specimen, posterior_draws, rig_case
@@ -69,6 +70,20 @@ def test_a_law_that_is_wrong_in_pressure_is_told_though_every_level_fits():
     inner = table[~table["extrapolated"]]
     assert inner["inside90"].mean() < 0.5
     assert (np.sign(inner["bias_N"]) == (-1.0) ** np.arange(1, 6)).all()
+
+
+def test_rows_that_are_means_have_the_noise_of_means(sound):
+    specimen, many = sound.specimen, 25
+    table = told(
+        calibrate(
+            replace(
+                specimen,
+                loops=replace(specimen.loops, averaged=many),
+                sensors=Sensors(force_sd_N=many**0.5 * specimen.sensors.force_sd_N),
+            )
+        )
+    )
+    assert abs(table["inside90"].mean() - 0.90) < 0.05
 
 
 def test_nothing_to_leave_out(sound):

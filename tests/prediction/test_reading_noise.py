@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -24,6 +26,15 @@ def test_white_and_correlated_noise_add_up() -> None:
     made = noise(noise_sd_N=0.3, noise_corr_sd_N=0.4)
     assert draws(made).std(axis=0) == pytest.approx([0.5, 0.5], rel=0.02)
     assert made.sd(np.zeros((N, 2)))[0, 0] == pytest.approx(0.5)
+
+
+def test_a_mean_of_readings_has_less_white_noise_alone() -> None:
+    made = replace(noise(noise_sd_N=0.9, noise_corr_sd_N=0.4), averaged=np.array([1.0, 9.0]))
+    expected = [np.hypot(0.9, 0.4), 0.5]
+    assert draws(made).std(axis=0) == pytest.approx(expected, rel=0.02)
+    assert made.sd(np.zeros((N, 2)))[0] == pytest.approx(expected)
+    tailed = draws(replace(noise(noise_sd_N=0.9, noise_dof=3.0), averaged=9.0))[:, 0]
+    assert stats.kstest(tailed / 0.3, stats.t(3.0).cdf).pvalue > 1e-3
 
 
 def test_it_grows_with_the_force() -> None:

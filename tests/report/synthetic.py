@@ -97,7 +97,7 @@ def muscle(rows_per_branch: int = 240, n_draws: int = 2000, **changes: Any) -> C
                 pd.DataFrame(
                     {
                         "kind": "loops", "level_kPa": P, "pressure_kPa": P, "contraction": x,
-                        "branch": branch, "force_N": reading, "fitted_N": fitted, "sd_N": 0.5, "cycle": 1,
+                        "branch": branch, "force_N": reading, "fitted_N": fitted, "cycle": 1,
                         "stroke": 2 * number + (s > 0), "time_s": np.arange(len(x)) * 0.1, "censored": False,
                     }
                 )
@@ -169,8 +169,8 @@ def material(n_draws: int = 2000, **changes: Any) -> CalibrationView:
     observed = pd.DataFrame(
         {
             "kind": "tensile", "level_kPa": np.nan, "pressure_kPa": np.nan, "contraction": x, "branch": "",
-            "force_N": stress(x) + 1500 * rng.standard_normal(400), "fitted_N": stress(x), "sd_N": 1600.0,
-            "cycle": 1, "stroke": 0, "time_s": np.nan, "censored": False,
+            "force_N": stress(x) + 1500 * rng.standard_normal(400), "fitted_N": stress(x), "cycle": 1,
+            "stroke": 0, "time_s": np.nan, "censored": False,
         }
     )  # fmt: skip
     draws = {

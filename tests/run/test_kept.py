@@ -135,6 +135,20 @@ def test_a_small_budget_exits_3_and_a_larger_one_goes_on(
             assert (again / name).read_bytes() == longer[name]
 
 
+@pytest.mark.parametrize("budget", [10, 30])
+def test_what_a_budget_cut_short_is_drawn_whole_by_a_larger_one(
+    budget: int, own_material: Path, material_run: Path, tmp_path: Path, here: Here
+) -> None:
+    run = tmp_path / "run"
+    here("calibrate", own_material, "-o", run, "--max-steps", budget)
+    short = state(run)["sampling"]
+    assert isinstance(short, dict) and short["steps"] == budget
+    assert here("calibrate", own_material, "-o", run).code == 0
+    for name in ("summary.csv", "bands.csv", "run.json"):
+        assert (run / name).read_bytes() == (material_run / name).read_bytes()
+    assert "kept" in here("calibrate", own_material, "-o", run).out
+
+
 def test_bad_input_leaves_an_existing_run_alone(
     muscle: Path, run_copy: Path, tmp_path: Path, here: Here
 ) -> None:
@@ -181,6 +195,20 @@ def test_results_do_not_mix_with_a_specimen(command: str, muscle: Path, tmp_path
         f"error: {specimen}: found a specimen's folder, expected one of its own"
     )
     assert stamps(specimen) == before
+
+
+@pytest.mark.parametrize("command", ["select", "diagnose"])
+def test_results_do_not_mix_with_a_calibration(
+    command: str, muscle: Path, run_copy: Path, here: Here
+) -> None:
+    """The run would keep another command's page as its own."""
+    before = stamps(run_copy)
+    result = here(command, muscle, "-o", run_copy)
+    assert result.code == 2
+    assert result.complaint.startswith(
+        f"error: {run_copy}: found a calibration's folder, expected one of its own"
+    )
+    assert stamps(run_copy) == before
 
 
 @pytest.mark.parametrize("target", ["nothing", "small"])

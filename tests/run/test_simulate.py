@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import json
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from .command import Here
+from mpam_calib.prediction.simulate import simulate
+from mpam_calib.run.calibrate import resolve_material
+from mpam_calib.specimen import read
+
+from .command import Here, contents, stamps
+from .small import SIMULATION, Specimen, loops_text
+
+UNITS = {"dead_band": "kPa", "braid_angle": "°", "length_offset": "mm"}
 
 
 @pytest.mark.parametrize(
@@ -19,6 +28,7 @@ def test_sizes_that_no_rig_has_are_refused(hide: str, muscle: Path, tmp_path: Pa
     assert result.code == 2
     assert result.complaint.startswith(f"error: --hide: found {hide.partition('=')[0]}=")
     assert "expected between " in result.complaint
+    assert result.complaint.endswith(f" {UNITS[hide.partition('=')[0]]}")
     assert not (tmp_path / "made").exists()
 
 
@@ -26,3 +36,61 @@ def test_a_size_that_a_rig_may_have_is_hidden_and_told(muscle: Path, tmp_path: P
     assert here("simulate", muscle, "-o", tmp_path / "made", "--hide", "dead_band=7.5").code == 0
     truth = json.loads((tmp_path / "made" / "truth.json").read_text())
     assert truth["hidden"]["dead_band"] == {"P_DB_kPa": 7.5}
+
+
+@pytest.mark.parametrize("effect", ["braid_kinematics", "coulomb_friction", "dead_band"])
+def test_what_the_simulation_has_already_cannot_be_hidden(effect: str, tmp_path: Path, here: Here) -> None:
+    specimen = Specimen(simulation=SIMULATION + 'effects = ["dead_band"]\n')
+    folder = specimen.write(tmp_path / "own", loops=loops_text(rows=30))
+    result = here("simulate", folder, "-o", tmp_path / "made", "--hide", effect)
+    assert result.code == 2
+    assert result.complaint.startswith(f'error: --hide: found "{effect}"')
+    assert "expected an effect that the simulation does not " in result.complaint
+    assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize("effect", ["presliding", "rate_friction"])
+def test_no_friction_cannot_be_changed(effect: str, tmp_path: Path, here: Here) -> None:
+    specimen = Specimen(simulation=SIMULATION.replace('friction = "coulomb"', 'friction = "none"'))
+    folder = specimen.write(tmp_path / "own", loops=loops_text(rows=30))
+    result = here("simulate", folder, "-o", tmp_path / "made", "--hide", effect)
+    assert result.code == 2
+    assert result.complaint.startswith(f"error: --hide: found {effect} without friction, expected ")
+    with_friction = ("--hide", effect, "--hide", "coulomb_friction")
+    assert here("simulate", folder, "-o", tmp_path / "made", *with_friction).code == 0
+
+
+def test_only_another_synthetic_specimen_is_replaced(
+    muscle: Path, run_copy: Path, tmp_path: Path, here: Here
+) -> None:
+    real = Path(shutil.copytree(muscle, tmp_path / "real"))
+    for folder, owner in ((real, "a specimen's folder"), (run_copy, "a calibration's folder")):
+        before = stamps(folder)
+        result = here("simulate", muscle, "-o", folder)
+        assert result.code == 2
+        assert result.complaint.startswith(f"error: {folder}: found {owner}, expected ")
+        assert stamps(folder) == before
+    made = tmp_path / "made"
+    assert here("simulate", muscle, "-o", made).code == 0
+    first = contents(made)
+    assert here("simulate", muscle, "-o", made, "--seed", 1).code == 0
+    assert contents(made).keys() == first.keys() and contents(made) != first
+
+
+def test_a_synthetic_specimen_finds_the_run_of_its_moduli(
+    material_run: Path, tmp_path: Path, here: Here
+) -> None:
+    shutil.copytree(material_run, tmp_path / "material_run")
+    simulation = SIMULATION.replace('"loops"', '"run:../material_run"').replace("linear", "constant")
+    folder = Specimen(simulation=simulation).write(tmp_path / "muscle", loops=loops_text(rows=60))
+    made = tmp_path / "deep" / "made"
+    assert here("simulate", folder, "-o", made).code == 0
+    assert resolve_material(read(made)) == resolve_material(read(folder))
+
+
+def test_each_synthetic_row_is_one_reading(muscle: Path) -> None:
+    """Though the rows that it stands at were averages of a very large file."""
+    specimen = read(muscle)
+    assert specimen.loops is not None
+    made = simulate(replace(specimen, loops=replace(specimen.loops, averaged=9))).specimen
+    assert made.loops is not None and made.loops.averaged == 1

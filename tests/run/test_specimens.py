@@ -146,7 +146,8 @@ def test_a_materials_run_gives_a_muscle_its_moduli(
         assert found.loc[name, "sd"] < 1.05 * tested.loc[name, "sd"]
         assert abs(found.loc[name, "mean"] - value) < 4.0 * found.loc[name, "sd"]
     assert len(json.loads((run / "run.json").read_text())["blueprint"]["material"]["mean"]) == 2
-    assert "tensile test" in (run / "report.html").read_text()
+    report = (run / "report.html").read_text()
+    assert "tensile test between strains 0 and 1;" in report and "did not converge" not in report
 
     # The run knows its own order and strain; the muscle may say the same or nothing.
     declaration = folder / "specimen.toml"
@@ -168,6 +169,23 @@ def test_a_materials_run_gives_a_muscle_its_moduli(
     assert here("calibrate", material, "-o", tmp_path / "material_run", "--seed", 3).code == 0
     again = here("calibrate", folder, "-o", run, *BARE)
     assert again.code == 0 and "kept" not in again.out
+
+
+def test_moduli_of_another_muscle_that_has_not_converged_are_told(tmp_path: Path, here: Here) -> None:
+    constant = SIMULATION.replace("linear", "constant")
+    loops = loops_text(rows=60, moduli=MATERIAL)
+    first = Specimen(simulation=constant).write(tmp_path / "first", loops=loops)
+    simulation = constant.replace('"loops"', '"run:../run"')
+    second = Specimen(simulation=simulation).write(tmp_path / "second", loops=loops)
+    run, after = tmp_path / "run", tmp_path / "after"
+    assert here("calibrate", first, "-o", run, *BARE, "--max-steps", 3).code == 3
+    result = here("predict", run, "--pressure", 120)
+    assert result.code == 0
+    assert result.complaint.startswith(f"warning: {run} did not converge")
+    assert here("calibrate", second, "-o", after, *BARE, "--max-steps", 3).code == 3
+    report = (after / "report.html").read_text()
+    assert "The moduli come from another muscle" in report and "tensile test" not in report
+    assert "The run that the moduli come from did not converge" in report
 
 
 def test_without_data_there_is_nothing_to_calibrate(tmp_path: Path, here: Here) -> None:

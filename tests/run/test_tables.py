@@ -6,9 +6,15 @@ import json
 import re
 from pathlib import Path
 
+import arviz as az
 import numpy as np
 import pandas as pd
 import pytest
+
+from mpam_calib.model.blueprint import Options, draw_blueprint
+from mpam_calib.posterior.mode import evaluate
+from mpam_calib.posterior.target import build_target, locate
+from mpam_calib.specimen import read
 
 from .command import Here
 from .small import K_F, LEVELS, MODULI, NOISE_N, free_contraction, static_force
@@ -46,6 +52,19 @@ def test_the_summary_finds_what_the_data_were_made_with(summary: pd.DataFrame) -
     assert (summary["q05"] < summary["q50"]).all() and (summary["q50"] < summary["q95"]).all()
     assert (summary["rhat"] <= 1.01).all()
     assert (summary[["ess_bulk", "ess_tail"]] >= 100.0).all(axis=None)
+
+
+def test_each_stored_log_posterior_is_that_of_its_draw(muscle: Path, muscle_run: Path) -> None:
+    stored = az.from_netcdf(str(muscle_run / "posterior.nc"))
+    log_prob = stored["sample_stats"]["lp"].to_numpy()
+    assert log_prob.shape == stored["posterior"]["K_f"].shape
+    specimen = read(muscle)
+    blueprint = draw_blueprint(specimen, Options(correlated_noise=False))
+    target, _ = locate(build_target(specimen, blueprint), np.random.default_rng([0, 0]))
+    some = np.s_[:, ::97]
+    u = stored["sampler_coordinates"]["coordinates"].to_numpy()[some]
+    again = evaluate(target, u.reshape(-1, u.shape[-1])).reshape(u.shape[:2])
+    np.testing.assert_allclose(log_prob[some], again, atol=1e-6)
 
 
 def test_the_bands_hold_every_quantity_and_its_observed_twin(bands: pd.DataFrame) -> None:
