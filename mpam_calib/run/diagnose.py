@@ -11,7 +11,7 @@ from mpam_calib.criticism.diagnose import Diagnosis, Tell, describe, diagnose, e
 from mpam_calib.posterior.checkpoint import write_atomically
 from mpam_calib.report.diagnosis import diagnosis_page
 from mpam_calib.run.calibrate import resolve_material
-from mpam_calib.run.files import demand_folder, write_json
+from mpam_calib.run.files import RUN_FILE, demand_folder, write_json
 from mpam_calib.run.folder import keep_material, run_digest
 from mpam_calib.run.kept import Kept
 from mpam_calib.specimen import read
@@ -28,7 +28,7 @@ def diagnose_to_folder(
     Raises ``InputError`` before anything is written.
     """
     specimen = read(source)
-    demand_folder(run)
+    demand_folder(run, replaces=RUN_FILE)
     material = resolve_material(specimen)
     digest = run_digest(specimen.digest, command="diagnose", seed=seed, material=material)
     kept = Kept(run, digest, FILES)

@@ -22,6 +22,7 @@ from mpam_calib.model.model import Model, build_model
 from mpam_calib.posterior.checkpoint import Checkpoint, sweep, write_atomically
 from mpam_calib.posterior.draws import Draws, reported
 from mpam_calib.run.files import RUN_FILE, write_csv, write_json
+from mpam_calib.run.kept import written_over
 from mpam_calib.specimen.recording import Specimen
 
 REPORT = "report.html"
@@ -66,8 +67,9 @@ class RunFolder:
         return content if content.get("digest") == self.digest else None
 
     def complete(self) -> bool:
-        """Whether all that a finished calibration leaves is there, and its draws can be read."""
-        return all((self.path / name).is_file() for name in WRITTEN) and _readable(self.path / "posterior.nc")
+        """Whether all that a finished calibration leaves is there, its own page too, and can be read."""
+        there = all((self.path / name).is_file() for name in WRITTEN)
+        return there and not written_over(self.path / REPORT) and _readable(self.path / "posterior.nc")
 
     def clear(self) -> None:
         """Remove an older run's results, the mark of a finished run first, and what was left half-written."""

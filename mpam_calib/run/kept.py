@@ -13,6 +13,19 @@ MARK = "kept.json"
 """Written last; holds the digest, and that of every file, since another command may write the same names."""
 
 
+def written_over(file: Path) -> bool:
+    """Whether a file is what a command of this module left beside it, and no calibration's."""
+    try:
+        content = json.loads((file.parent / MARK).read_text(encoding="utf-8"))
+        return bool(content["files"].get(file.name) == _sum(file))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False
+
+
+def _sum(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
 @dataclass(frozen=True)
 class Kept:
     """The ``files`` that a command leaves in a folder, and the digest of what they come from."""
@@ -38,5 +51,4 @@ class Kept:
         write_json(self._content(), self.folder / MARK)
 
     def _content(self) -> dict[str, object]:
-        sums = {name: hashlib.sha256((self.folder / name).read_bytes()).hexdigest() for name in self.files}
-        return {"digest": self.digest, "files": sums}
+        return {"digest": self.digest, "files": {name: _sum(self.folder / name) for name in self.files}}

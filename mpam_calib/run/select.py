@@ -8,7 +8,7 @@ from pathlib import Path
 from mpam_calib.criticism.select import Selection, select
 from mpam_calib.report.selection import selection_page
 from mpam_calib.run.calibrate import resolve_material
-from mpam_calib.run.files import demand_folder, write_csv
+from mpam_calib.run.files import RUN_FILE, demand_folder, write_csv
 from mpam_calib.run.folder import run_digest
 from mpam_calib.run.kept import Kept
 from mpam_calib.specimen import read
@@ -29,7 +29,7 @@ def select_to_folder(
     Raises ``InputError`` before anything is written.
     """
     specimen = read(source)
-    demand_folder(run)
+    demand_folder(run, replaces=RUN_FILE)
     material = resolve_material(specimen)
     digest = run_digest(
         specimen.digest, command="select", seed=seed, replicates=replicates, material=material
