@@ -57,8 +57,8 @@ def level_labels(levels: Sequence[float] | NDArray[np.float64]) -> list[str]:
 
     >>> level_labels([50e3, 100e3])
     ['50', '100']
-    >>> level_labels([12.5e3, 13.5e3])
-    ['12.5', '13.5']
+    >>> level_labels([12.1e3, 12.4e3])
+    ['12.1', '12.4']
     """
     for decimals in range(DECIMALS):
         labels = [f"{level / KPA:.{decimals}f}" for level in levels]
