@@ -40,9 +40,7 @@ def candidates(problem: Problem) -> Candidates:
 def _why_not(identifier: str, problem: Problem) -> str | None:
     """None: testable. Empty: part of the simulation already. Else the reason."""
     simulation = problem.blueprint.simulation
-    if identifier in simulation.effect_ids or identifier == f"{simulation.friction}_friction":
-        return ""
-    if identifier == "braid_kinematics" and simulation.kinematics == "inextensible_braid":
+    if identifier in simulation.effect_ids or identifier in simulation.effects_within:
         return ""
     if effect(identifier).needs_braid and problem.blueprint.braid is None:
         return "no [braid] in specimen.toml"

@@ -22,24 +22,23 @@ def model_space(specimen: Specimen) -> list[Simulation]:
     (:mod:`mpam_calib.criticism.ranking` starts each from the one before).
     """
     declared = specimen.simulation
-    listed = declared.effect_ids
     frictions = ["none"]
     parts = [p for p in (specimen.loops, specimen.force_map) if p is not None]
     if any(np.any(p.branch == 1) and np.any(p.branch == -1) for p in parts):
         frictions = ["coulomb", "none"] + (["strand"] if specimen.braid is not None else [])
-    frictions = [f for f in frictions if f"{f}_friction" not in listed]
     orders: list[int] = list(ORDERS)
     laws = [law for law, needed in LAWS.items() if len(specimen.levels_Pa) >= needed]
     strains = ["engineering", "stretch"]
     if declared.moduli != "loops":
         orders, laws, strains = [declared.order], ["constant"], [declared.strain]
-    kinematics = [*(["inextensible_braid"] if "braid_kinematics" not in listed else []), "constant_thickness"]
+    kinematics = ["inextensible_braid", "constant_thickness"]
     twice = "exponential" if (declared.law, declared.order) == ("exponential_each", 1) else "exponential_each"
-    return [
+    models = (
         declared.model_copy(
             update={"kinematics": k, "strain": s, "order": m, "friction": f, "law": w}
             | ({"friction_by_pressure": False} if f != declared.friction else {})
         )
         for k, s, m, f, w in product(kinematics, strains, orders, frictions, laws)
         if (w, m) != (twice, 1)
-    ]
+    )
+    return [m for m in models if not m.effects_within.keys() & set(declared.effect_ids)]

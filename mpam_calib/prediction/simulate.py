@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +18,7 @@ from mpam_calib.posterior.row_motion import row_readings
 from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.curves import contraction_grid, first_root
 from mpam_calib.prediction.protocol import LEVELS, thesis_protocol
-from mpam_calib.specimen.consistency import check_twice
-from mpam_calib.specimen.declaration import Simulation
 from mpam_calib.specimen.recording import ForceMap, Loops, Specimen
-from mpam_calib.specimen.toml_source import TomlSource
 from mpam_calib.units import si_factor
 
 Array = NDArray[np.float64]
@@ -125,10 +121,11 @@ def _with_hidden(
         item = effect(identifier)
         if item.needs_braid and specimen.braid is None:
             raise InputError(place, f"{identifier} without [braid]", "the strands' values in specimen.toml")
-        if identifier in blueprint.simulation.effect_ids:
-            raise InputError(place, f'"{identifier}"', "an effect that the simulation does not declare")
-        simulation = _with_effect(blueprint.simulation, identifier, place)
-        blueprint = blueprint.model_copy(update={"simulation": simulation})
+        simulation = blueprint.simulation
+        if identifier in simulation.effect_ids or identifier in simulation.effects_within:
+            raise InputError(place, f'"{identifier}"', "an effect that the simulation does not have")
+        extended = simulation.model_copy(update={"effects": (*simulation.effects, identifier)})
+        blueprint = blueprint.model_copy(update={"simulation": extended})
         setting = blueprint.setting()
         assert setting is not None
         parameters = item.parameters(setting)
@@ -154,16 +151,6 @@ def _with_hidden(
         if not rubs:
             raise InputError(place, f"{identifier} without friction", "a friction that it can change")
     return build_model(blueprint), hidden
-
-
-def _with_effect(simulation: Simulation, identifier: str, place: str) -> Simulation:
-    """The simulation with one more effect, refused where it is there under another name already."""
-    extended = simulation.model_copy(update={"effects": (*simulation.effects, identifier)})
-    try:
-        check_twice(TomlSource(Path(place), (), {}), extended)
-    except InputError as error:
-        raise InputError(place, error.found, "an effect that the simulation does not have") from None
-    return extended
 
 
 def _protocol(model: Model, values: dict[str, Array], eta: Array) -> Loops:

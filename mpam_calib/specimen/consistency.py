@@ -30,7 +30,7 @@ def normalised_simulation(source: TomlSource, declaration: Declaration) -> Simul
     tensile = bool(declaration.files.of("tensile"))
     _check_moduli(source, simulation, tensile)
     _check_braid(source, declaration)
-    check_twice(source, simulation)
+    _check_twice(source, simulation)
     if tensile and not declaration.files.muscle and declaration.geometry is None:
         return simulation.model_copy(update={"moduli": "tensile", "law": "constant", "friction": "none"})
     if simulation.moduli.startswith("run:"):
@@ -156,11 +156,9 @@ def _check_braid(source: TomlSource, declaration: Declaration) -> None:
         raise fault(source, keys, f"{users[0]} without a [braid]", "E_br_GPa, nu_s, R_br_mm and n in [braid]")
 
 
-def check_twice(source: TomlSource, simulation: Simulation) -> None:
+def _check_twice(source: TomlSource, simulation: Simulation) -> None:
     """Refuse an effect that the simulation has already."""
-    has = {f"{simulation.friction}_friction": f'friction = "{simulation.friction}"'}
-    if simulation.kinematics == "inextensible_braid":
-        has["braid_kinematics"] = 'kinematics = "inextensible_braid"'
+    has = simulation.effects_within
     for name in simulation.effect_ids:
         if name in has:
             keys = ["simulation", "effects"]

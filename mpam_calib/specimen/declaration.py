@@ -158,6 +158,16 @@ class Simulation(Table):
         """Ids of the declared effects, without their forms (``id:form``)."""
         return tuple(effect.partition(":")[0] for effect in self.effects)
 
+    @property
+    def effects_within(self) -> dict[str, str]:
+        """Effects that the friction or the kinematics are already, and the words that declare these."""
+        within = (
+            {} if self.friction == "none" else {f"{self.friction}_friction": f'friction = "{self.friction}"'}
+        )
+        if self.kinematics == "inextensible_braid":
+            within["braid_kinematics"] = 'kinematics = "inextensible_braid"'
+        return within
+
     @field_validator("moduli")
     @classmethod
     def _moduli_word(cls, value: str) -> str:
