@@ -15,6 +15,7 @@ from mpam_calib.posterior.checkpoint import Checkpoint
 from mpam_calib.posterior.collapsed import Collapsed, Guide
 from mpam_calib.posterior.convergence import ESS_WANTED
 from mpam_calib.posterior.draws import Draws, Reported, keep_draws, kept_for, reported
+from mpam_calib.posterior.material import material_of
 from mpam_calib.posterior.mode import Mode
 from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Sampling, sample
 from mpam_calib.posterior.summary import all_converged, summarise
@@ -98,9 +99,7 @@ def calibrate(
     whether the draws can be used.
     """
     if material is None:
-        from mpam_calib.run.calibrate import resolve_material  # that module builds on this one
-
-        material = resolve_material(specimen)
+        material = material_of(specimen)
     target = build_target(specimen, draw_blueprint(specimen, options, material))
     found: tuple[Guide, list[Mode]] | None = checkpoint.load("modes") if checkpoint else None
     if found is None:

@@ -27,7 +27,7 @@ def predict(
     Writes bands on force, blocked force and free contraction to RUN/predictions.csv, with the columns
     of bands.csv; what lies beyond the data is marked there as extrapolated.
     """
-    from mpam_calib.run.folder import unconverged
+    from mpam_calib.posterior.stored import unconverged
     from mpam_calib.run.predict import parse_pressures, predict_to_folder
 
     pressures = None if pressure is None else parse_pressures(pressure)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from mpam_calib.criticism.budget import Budget, misfit_budget
 from mpam_calib.criticism.candidates import Candidates, candidates
 from mpam_calib.criticism.gain import Gain, measure_gain
+from mpam_calib.criticism.journal import Journal
 from mpam_calib.criticism.limits import Band, hidden_sizes
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.refits import Set
@@ -60,10 +62,12 @@ def diagnose(
     *,
     material: MaterialPosterior | None = None,
     tell: Tell | None = None,
+    journal: Journal | None = None,
 ) -> Diagnosis:
     """Find what the declared simulation gets wrong in a specimen's recordings.
 
-    Raises ``InputError`` where the specimen has no muscle data.
+    What is in the ``journal`` of an interrupted diagnosis of the same specimen is not done again. Raises
+    ``InputError`` where the specimen has no muscle data.
     """
     if not (specimen.loops is not None or specimen.force_map is not None):
         raise InputError(specimen.folder / "specimen.toml", "no loops and no force map", "one to diagnose")
@@ -71,7 +75,7 @@ def diagnose(
     blueprint = draw_blueprint(specimen, Options(nuisances=False, remainder=False), material)
     problem = build_problem(specimen, blueprint)
     tested = candidates(problem)
-    found = search(problem, tested.tested, lambda share: listener("searching", share), workers=WORKERS)
+    found = search(problem, tested.tested, partial(listener, "searching"), workers=WORKERS, journal=journal)
     problem = found.problem  # its noise settled by the best set
     verdict = judge(found)
     for size in range(len(SIZES)):
@@ -79,12 +83,10 @@ def diagnose(
     budget = misfit_budget(found, verdict.standing)
     gain = None
     if verdict.standing:
-
-        def share_done(share: float) -> None:
-            listener("measuring the gain", share)
-
         named = found.fits[verdict.standing, found.best_size(verdict.standing)]
-        gain = measure_gain(problem, tested.tested, named, WORKERS, share_done)
+        gain = measure_gain(
+            problem, tested.tested, named, WORKERS, partial(listener, "measuring the gain"), journal
+        )
     fits = [found.fits[s, found.best_size(s)] for s in (frozenset(), verdict.standing)]
     structure = list(zip(*(structure_tests(problem, f) for f in fits), strict=True))
     limits = hidden_sizes(problem, tested.tested) if verdict.word == "adequate" else {}

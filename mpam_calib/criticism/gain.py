@@ -18,6 +18,7 @@ from mpam_calib.criticism.budget import beyond_noise
 from mpam_calib.criticism.candidates import HISTORY
 from mpam_calib.criticism.climb import STEP
 from mpam_calib.criticism.fit import Fit, chain_for, doubt_columns
+from mpam_calib.criticism.journal import Journal
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.refits import Set, causes_of
 from mpam_calib.criticism.search import Search, search
@@ -67,6 +68,7 @@ def measure_gain(
     named: Fit,
     workers: int = 1,
     tell: Callable[[float], None] | None = None,
+    journal: Journal | None = None,
 ) -> Gain | None:
     """The gain of the causes that were named, of which ``named`` is the fit to all rows.
 
@@ -81,7 +83,7 @@ def measure_gain(
     parts = [labels[i::FOLDS] for i in range(min(FOLDS, len(labels)))]
     folds = []
     for part in parts:
-        folds.append(_fold(problem, tested, named, np.isin(groups, part), workers))
+        folds.append(_fold(problem, tested, named, np.isin(groups, part), workers, journal))
         if tell is not None:
             tell(len(folds) / len(parts))
     errors = [
@@ -106,10 +108,17 @@ def measure_gain(
 
 
 def _fold(
-    problem: Problem, tested: tuple[str, ...], named: Fit, held: NDArray[np.bool_], workers: int
+    problem: Problem,
+    tested: tuple[str, ...],
+    named: Fit,
+    held: NDArray[np.bool_],
+    workers: int,
+    journal: Journal | None,
 ) -> _Fold:
     # Workers share one fold's search: three folds on two workers would leave one idle.
-    found = search(problem.take(~held), tested, width=FOLD_WIDTH, workers=workers, settle=False)
+    found = search(
+        problem.take(~held), tested, width=FOLD_WIDTH, workers=workers, settle=False, journal=journal
+    )
     # What a verdict on these rows alone would report: in "unexplained", only what stands even so.
     chosen = judge(found).standing
     found.refit_all((chosen, size) for size in range(len(SIZES)))

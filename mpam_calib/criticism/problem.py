@@ -97,13 +97,7 @@ class Problem:
 
     def middle(self) -> Readings:
         """One reading per row."""
-        n = len(self)
-        low, high = self.readings.take(slice(0, n)), self.readings.take(slice(n, None))
-        return replace(
-            low,
-            displacement=0.5 * (low.displacement + high.displacement),
-            travel=0.5 * (low.travel + high.travel),
-        )
+        return self.readings.middles()
 
     @cached_property
     def lean(self) -> tuple[Readings, Ints, Ints]:

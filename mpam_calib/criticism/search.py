@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.criticism.fit import Fit
 from mpam_calib.criticism.forms import flexible
+from mpam_calib.criticism.journal import Journal, journalled
 from mpam_calib.criticism.noise_scale import noise_scale
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
 from mpam_calib.criticism.refits import (
@@ -30,7 +31,7 @@ from mpam_calib.criticism.refits import (
     with_better_forms,
     with_doubt,
 )
-from mpam_calib.criticism.spread import Alone, Spread, spread_over
+from mpam_calib.criticism.spread import Alone, Spread
 from mpam_calib.model.bend import is_bend
 from mpam_calib.model.effect import effect
 
@@ -237,15 +238,17 @@ def search(
     width: int = WIDTH,
     workers: int = 1,
     settle: bool = True,
+    journal: Journal | None = None,
 ) -> Search:
     """Search sets of up to three effects, the remainder always in play.
 
     Singles are refitted for every size of the remainder; kept sets are extended by the most promising
     partners, refitted exactly, and pruned again. Then the best set says how small the noise is, unless that
-    is not to ``settle`` any more, and the leading sets are refitted. ``listener`` is told the share done.
+    is not to ``settle`` any more, and the leading sets are refitted. ``listener`` is told the share done;
+    what is in the ``journal`` is not done again.
     """
     tell = listener or (lambda share: None)
-    with spread_over(problem, workers) as spread:
+    with journalled(problem, workers, journal) as spread:
         found = Search(problem, tested, spread)
         _grow(found, width, tell)
         if not settle:
@@ -255,7 +258,7 @@ def search(
         fits = [f for (effects, _), f in found.fits.items() if effects == best]
         # Never up: what is left beyond the noise may be a cause that the best set still lacks.
         settled = problem.with_noise_scale(min(noise_scale(problem, fits), 1.0))
-        with spread_over(settled, workers) as spread:
+        with journalled(settled, workers, journal) as spread:
             found = found.on(settled, spread)
             _finish(found, tell)
     found.spread = Alone(found.problem)

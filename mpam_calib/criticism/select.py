@@ -23,12 +23,13 @@ from mpam_calib.criticism.evidence import (
     weigh,
 )
 from mpam_calib.criticism.held_out import LEVEL_COLUMNS, hold_out, hold_out_each
+from mpam_calib.criticism.journal import Journal, journalled
 from mpam_calib.criticism.noise_scale import settle_noise
 from mpam_calib.criticism.odds import declared_or_beside, odds
 from mpam_calib.criticism.problem import build_problem
 from mpam_calib.criticism.ranking import Ranked, blueprint_of, fitted, rank_spread
 from mpam_calib.criticism.space import model_space
-from mpam_calib.criticism.spread import held_problem, spread_over
+from mpam_calib.criticism.spread import held_problem
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
 from mpam_calib.posterior.bridge import Bridge
@@ -76,10 +77,12 @@ def select(
     material: MaterialPosterior | None = None,
     tell: Callable[[str, float], None] | None = None,
     workers: int = 2,
+    journal: Journal | None = None,
 ) -> Selection:
     """Rank the model space on a specimen's recordings; raises ``InputError`` without muscle data.
 
     ``replicates`` is how many sets of loops are simulated from each leading model for the confusion matrix.
+    What is in the ``journal`` of an interrupted selection of the same specimen is not done again.
     """
     if specimen.loops is None and specimen.force_map is None:
         raise InputError(specimen.folder / "specimen.toml", "no loops and no force map", "one to select on")
@@ -88,7 +91,7 @@ def select(
     blueprint = draw_blueprint(specimen, Options(nuisances=False, remainder=False), material)
     space = model_space(specimen)
     problem = settle_noise(build_problem(specimen, blueprint), space)
-    with spread_over(problem, workers) as spread:
+    with journalled(problem, workers, journal) as spread:
         ranked = rank_spread(
             spread,
             space,

@@ -42,11 +42,14 @@ class Options(Value):
 
 
 class MaterialPosterior(Value):
-    """Moduli as another run left them: mean (order,), covariance (order, order), Pa."""
+    """Moduli as another run left them: mean (order,), covariance (order, order), Pa.
+
+    ``strain_range`` is that of the tensile test behind them, None where a muscle's loops gave them.
+    """
 
     mean: tuple[float, ...]
     covariance: tuple[tuple[float, ...], ...]
-    strain_range: tuple[float, float]
+    strain_range: tuple[float, float] | None
     convention: str
 
 

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.bend import FORM, bend_factor, bend_parameters
-from mpam_calib.model.effect_ids import add_effect_id, load_outside_effects
 from mpam_calib.model.priors import Parameter
 from mpam_calib.model.state import Setting, State
+from mpam_calib.specimen.effect_ids import add_effect_id, load_outside_effects
 
 Array = NDArray[np.float64]
 Parameters = Callable[[Setting], tuple[Parameter, ...]]

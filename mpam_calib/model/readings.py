@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,16 @@ class Readings:
     def take(self, index: NDArray[np.generic] | slice) -> Readings:
         """The rows picked by an index, a mask or a slice."""
         return Readings(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+    def middles(self) -> Readings:
+        """One reading per row, where the first and the second half (n,) are two places in each row."""
+        n = len(self) // 2
+        low, high = self.take(slice(0, n)), self.take(slice(n, None))
+        return replace(
+            low,
+            displacement=0.5 * (low.displacement + high.displacement),
+            travel=0.5 * (low.travel + high.travel),
+        )
 
     @staticmethod
     def join(parts: list[Readings]) -> Readings:

@@ -83,10 +83,7 @@ class LoopBins:
 
     def middle(self) -> Readings:
         """One reading per bin, at its mean."""
-        n = len(self)
-        low, high = self.readings.take(slice(0, n)), self.readings.take(slice(n, None))
-        both = {name: 0.5 * (getattr(low, name) + getattr(high, name)) for name in ("displacement", "travel")}
-        return Readings(**{**low.__dict__, **both})
+        return self.readings.middles()
 
 
 def _edges(rest: NDArray[np.bool_], most: int, finest: int) -> Ints:

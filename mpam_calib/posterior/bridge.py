@@ -14,7 +14,7 @@ from emcee.autocorr import integrated_time
 from numpy.typing import NDArray
 from scipy import special
 
-from mpam_calib.posterior.evidence import Evidence
+from mpam_calib.posterior.evidence import RELIABLE, Evidence
 from mpam_calib.posterior.mode import Density, evaluate
 from mpam_calib.posterior.proposal import StudentMixture
 
@@ -25,8 +25,6 @@ DRAWS = 1000
 BURN = 0.1
 INFLATION = 1.15
 ROUNDS = 100
-RELIABLE = 0.1
-"""Error (nats) above which a bridge is not to be believed: it is then too small itself."""
 
 
 class Bridge(NamedTuple):

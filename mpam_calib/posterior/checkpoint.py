@@ -1,7 +1,8 @@
 """Blocks of draws on disk: written whole or not at all, each with the states to resume from.
 
 A part is one line of text that seals it, then a zip archive of plain arrays (``.npz``, read without pickle)
-with a JSON text that says how they hang together. Reading one can only build dataclasses of this package.
+with a JSON text that says how they hang together. Reading one can only build dataclasses, named tuples and
+declarations of this package.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import hashlib
 import importlib
 import io
 import json
+import math
 import os
 import shutil
 import tempfile
@@ -20,11 +22,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
 Arrays = dict[str, NDArray[Any]]
 
-HEADER = "mpam-calib checkpoint 2"
+HEADER = "mpam-calib checkpoint 3"
 TREE = "tree"
 UNFINISHED = ".part"
 """Suffix of a file that is being written; a killed process may leave one behind."""
@@ -64,7 +68,7 @@ class Checkpoint:
     digest: str
 
     def save(self, name: str, part: Any) -> None:
-        """Store one part under a name: numbers, texts, arrays, dataclasses of this package, their lists."""
+        """Store one part under a name: numbers, texts, arrays, tables, values of this package, lists."""
         payload = pack(part, self.digest)
         write_atomically(self._path(name), lambda path: path.write_bytes(payload))
 
@@ -85,10 +89,11 @@ class Checkpoint:
 
 def pack(part: Any, digest: str) -> bytes:
     """The bytes of a part: a line with the run's digest and the seal, then the archive."""
-    arrays: Arrays = {}
-    tree = json.dumps(_encode(part, arrays))
+    store = _Store()
+    tree = json.dumps(_encode(part, store))
     stream = io.BytesIO()
-    np.savez(stream, allow_pickle=False, **{TREE: np.frombuffer(tree.encode(), dtype=np.uint8)}, **arrays)
+    arrays = {TREE: np.frombuffer(tree.encode(), dtype=np.uint8), **store.joined()}
+    np.savez(stream, allow_pickle=False, **arrays)
     archive = stream.getvalue()
     return f"{HEADER} {digest} {_seal(digest, archive)}\n".encode() + archive
 
@@ -111,22 +116,55 @@ def _seal(digest: str, archive: bytes) -> str:
     return hashlib.sha256(digest.encode() + archive).hexdigest()
 
 
-def _encode(item: Any, arrays: Arrays) -> Any:
-    """JSON for ``item``; its arrays go to ``arrays`` under running names."""
+class _Store:
+    """The arrays of a part, those of one kind end to end: a part may hold thousands of small ones."""
+
+    def __init__(self) -> None:
+        self._kinds: dict[str, list[NDArray[Any]]] = {}
+        self._lengths: dict[str, int] = {}
+
+    def add(self, array: NDArray[Any]) -> list[Any]:
+        """Keep an array; its kind, where it begins, and its shape."""
+        kind = array.dtype.str
+        begin = self._lengths.get(kind, 0)
+        self._kinds.setdefault(kind, []).append(array.ravel())
+        self._lengths[kind] = begin + array.size
+        return [kind, begin, list(array.shape)]
+
+    def joined(self) -> Arrays:
+        """One array of each kind."""
+        return {kind: np.concatenate(parts) for kind, parts in self._kinds.items()}
+
+
+def _encode(item: Any, store: _Store) -> Any:
+    """JSON for ``item``; its arrays go to the ``store``."""
     if item is None or type(item) in (bool, int, float, str):
         return item
     if isinstance(item, np.ndarray | np.generic):
-        name = f"a{len(arrays)}"
-        arrays[name] = np.asarray(item)
-        return {"scalar" if isinstance(item, np.generic) else "array": name}
+        kept = store.add(np.asarray(item))
+        return {"scalar" if isinstance(item, np.generic) else "array": kept}
     if type(item) in (list, tuple):
-        return {type(item).__name__: [_encode(value, arrays) for value in item]}
+        return {type(item).__name__: [_encode(value, store) for value in item]}
+    if type(item) is frozenset:
+        return {"frozenset": [_encode(value, store) for value in sorted(item)]}
     if type(item) is dict and all(type(key) is str for key in item):
-        return {"dict": {key: _encode(value, arrays) for key, value in item.items()}}
-    if dataclasses.is_dataclass(item) and type(item).__module__.split(".")[0] == PACKAGE:
-        fields = {f.name: _encode(getattr(item, f.name), arrays) for f in dataclasses.fields(item)}
+        return {"dict": {key: _encode(value, store) for key, value in item.items()}}
+    if type(item) is pd.DataFrame:
+        columns = {str(name): _encode(item[name].to_numpy(), store) for name in item}
+        return {"table": columns}
+    if type(item).__module__.split(".")[0] == PACKAGE and (names := _fields(type(item))) is not None:
+        fields = {name: _encode(getattr(item, name), store) for name in names}
         return {"class": f"{type(item).__module__}:{type(item).__qualname__}", "fields": fields}
     raise TypeError(f"a checkpoint cannot hold {type(item).__qualname__}")
+
+
+def _fields(kind: type[Any]) -> list[str] | None:
+    """The fields of a dataclass, a named tuple or a declaration; None of anything else."""
+    if dataclasses.is_dataclass(kind):
+        return [f.name for f in dataclasses.fields(kind)]
+    if issubclass(kind, tuple) and hasattr(kind, "_fields"):
+        return list(kind._fields)
+    return list(kind.model_fields) if issubclass(kind, BaseModel) else None
 
 
 def _decode(tree: Any, arrays: Arrays) -> Any:
@@ -137,25 +175,35 @@ def _decode(tree: Any, arrays: Arrays) -> Any:
     ((kind, content),) = tree.items()
     match kind:
         case "array":
-            return arrays[content]
+            return _cut(content, arrays)
         case "scalar":
-            return arrays[content][()]
+            return _cut(content, arrays)[()]
         case "list":
             return [_decode(value, arrays) for value in content]
         case "tuple":
             return tuple(_decode(value, arrays) for value in content)
+        case "frozenset":
+            return frozenset(_decode(value, arrays) for value in content)
+        case "table":
+            return pd.DataFrame({key: _decode(value, arrays) for key, value in content.items()})
         case "dict":
             return {key: _decode(value, arrays) for key, value in content.items()}
         case _:
             raise Damaged(f"unknown kind {kind}")
 
 
+def _cut(kept: list[Any], arrays: Arrays) -> NDArray[Any]:
+    """One of the arrays that lie end to end."""
+    kind, begin, shape = kept
+    return arrays[kind][begin : begin + math.prod(shape)].reshape(shape)
+
+
 def _class(name: str) -> type[Any]:
-    """A dataclass of this package by its name; nothing else can be asked for."""
+    """A dataclass, named tuple or declaration of this package by its name; nothing else can be asked for."""
     module, _, qualname = name.partition(":")
     if module.split(".")[0] != PACKAGE:
         raise Damaged(f"a class from elsewhere: {module}")
     found = getattr(importlib.import_module(module), qualname)
-    if not (isinstance(found, type) and dataclasses.is_dataclass(found)):
-        raise Damaged(f"not a dataclass: {name}")
+    if not isinstance(found, type) or _fields(found) is None:
+        raise Damaged(f"no class of values: {name}")
     return found

@@ -14,6 +14,7 @@ from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.material import material_of
 from mpam_calib.posterior.row_motion import row_readings
 from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.curves import contraction_grid, first_root
@@ -60,9 +61,7 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
             specimen.folder / "specimen.toml", "neither data nor E_Pa", "one of them, to simulate from"
         )
     if fitted:
-        from mpam_calib.run.calibrate import resolve_material  # that module builds on this package
-
-        blueprint = draw_blueprint(specimen, material=resolve_material(specimen))
+        blueprint = draw_blueprint(specimen, material=material_of(specimen))
         target, modes = locate(build_target(specimen, blueprint), rng)
         values = {k: v.copy() for k, v in target.model.values(modes[0].u[None]).items()}
         eta = target.linear_mean(values)

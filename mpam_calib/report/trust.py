@@ -10,12 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from mpam_calib.posterior.convergence import ESS_WANTED, RHAT_LIMIT
 from mpam_calib.report.blocks import Level, Verdict
 from mpam_calib.report.numbers import significant
 from mpam_calib.report.view import CalibrationView
 
-RHAT_LIMIT: Final = 1.01
-ESS_LIMIT: Final = 400.0
 REMAINDER_CAUTION: Final = 0.02
 """A remainder above the noise and above this share of the top force is worth a caution ..."""
 REMAINDER_BAD: Final = 0.10
@@ -59,8 +58,8 @@ def convergence(view: CalibrationView) -> Limit | None:
         failed.append(
             f"independent starts disagree on {c.rhat_parameter} (R-hat {c.rhat_max:.3f}, limit {RHAT_LIMIT})"
         )
-    if not c.ess_min >= ESS_LIMIT:
-        failed.append(f"the draws are worth only {c.ess_min:.0f} independent ones ({ESS_LIMIT:.0f} wanted)")
+    if not c.ess_min >= ESS_WANTED:
+        failed.append(f"the draws are worth only {c.ess_min:.0f} independent ones ({ESS_WANTED:.0f} wanted)")
     if failed or not c.converged:
         why = "; ".join(failed) or "it was stopped by its step budget"
         sentence = (

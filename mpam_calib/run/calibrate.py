@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mpam_calib.calibration import calibrate
-from mpam_calib.model.blueprint import MaterialPosterior, Options
+from mpam_calib.model.blueprint import Options
 from mpam_calib.posterior.convergence import ESS_WANTED
+from mpam_calib.posterior.material import material_of
 from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Progress
-from mpam_calib.run.files import RUN_FILE, demand_folder
-from mpam_calib.run.folder import REPORT, RunFolder, material_folder, material_of, run_digest
-from mpam_calib.specimen import Specimen, read
+from mpam_calib.posterior.stored import RUN_FILE
+from mpam_calib.run.files import demand_folder
+from mpam_calib.run.folder import REPORT, RunFolder, run_digest
+from mpam_calib.specimen import read
 
 
 @dataclass(frozen=True)
@@ -20,12 +22,6 @@ class Outcome:
 
     converged: bool
     kept: bool
-
-
-def resolve_material(specimen: Specimen) -> MaterialPosterior | None:
-    """The posterior that ``moduli = "run:PATH"`` names (relative to the specimen's folder), if it does."""
-    folder = material_folder(specimen)
-    return None if folder is None else material_of(folder)
 
 
 def calibrate_to_folder(
@@ -44,7 +40,7 @@ def calibrate_to_folder(
     ``InputError`` before anything is written.
     """
     specimen = read(source)
-    material = resolve_material(specimen)
+    material = material_of(specimen)
     options = options or Options()
     digest = run_digest(
         specimen.digest,

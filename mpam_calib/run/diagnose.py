@@ -8,11 +8,13 @@ from pathlib import Path
 import tomlkit
 
 from mpam_calib.criticism.diagnose import Diagnosis, Tell, describe, diagnose, extended_effects
+from mpam_calib.criticism.journal import Journal
 from mpam_calib.posterior.checkpoint import write_atomically
+from mpam_calib.posterior.material import keep_material, material_of
+from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.report.diagnosis import diagnosis_page
-from mpam_calib.run.calibrate import resolve_material
-from mpam_calib.run.files import RUN_FILE, demand_folder, write_json
-from mpam_calib.run.folder import keep_material, run_digest
+from mpam_calib.run.files import demand_folder, write_json
+from mpam_calib.run.folder import run_digest
 from mpam_calib.run.kept import Kept
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
@@ -29,12 +31,12 @@ def diagnose_to_folder(
     """
     specimen = read(source)
     demand_folder(run, replaces=RUN_FILE)
-    material = resolve_material(specimen)
+    material = material_of(specimen)
     digest = run_digest(specimen.digest, command="diagnose", seed=seed, material=material)
     kept = Kept(run, digest, FILES)
     if kept.finished():
         return None
-    found = diagnose(specimen, material=material, tell=tell)
+    found = diagnose(specimen, material=material, tell=tell, journal=Journal(kept.unfinished))
     kept.begin()
     toml = source / "specimen.toml" if source.is_dir() else source
     write_extended(found, specimen, toml, run / "extended")

@@ -11,10 +11,9 @@ import pandas as pd
 
 from mpam_calib.errors import InputError
 from mpam_calib.posterior.checkpoint import write_atomically
+from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 
-RUN_FILE = "run.json"
-"""The mark of a finished calibration."""
 OWNERS = {SPECIMEN_FILE: "a specimen's folder", RUN_FILE: "a calibration's folder"}
 
 

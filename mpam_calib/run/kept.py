@@ -7,8 +7,10 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+from mpam_calib.posterior.checkpoint import Checkpoint
 from mpam_calib.run.files import write_json
 
+UNFINISHED = "unfinished"
 MARK = "kept.json"
 """Written last; holds the digest, and that of every file, since another command may write the same names."""
 
@@ -42,6 +44,11 @@ class Kept:
         except (OSError, ValueError):
             return False
 
+    @property
+    def unfinished(self) -> Checkpoint:
+        """Where a command that is not done keeps what it has."""
+        return Checkpoint(self.folder / UNFINISHED, self.digest)
+
     def begin(self) -> None:
         """Take an older mark away before anything is replaced."""
         (self.folder / MARK).unlink(missing_ok=True)
@@ -49,6 +56,7 @@ class Kept:
     def finish(self) -> None:
         """Mark the files as finished."""
         write_json(self._content(), self.folder / MARK)
+        self.unfinished.clear()
 
     def _content(self) -> dict[str, object]:
         return {"digest": self.digest, "files": {name: _sum(self.folder / name) for name in self.files}}

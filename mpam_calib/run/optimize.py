@@ -9,8 +9,8 @@ import numpy as np
 from mpam_calib.design.problem import R_BR
 from mpam_calib.design.robust import Optimiser, designs_table
 from mpam_calib.errors import InputError
+from mpam_calib.posterior.stored import load_run
 from mpam_calib.run.files import write_csv
-from mpam_calib.run.folder import load_run
 from mpam_calib.thesis.chapter3 import MONOFILAMENTS
 from mpam_calib.thesis.tables import table
 from mpam_calib.units import KPA

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from mpam_calib.calibration import predict
 from mpam_calib.errors import InputError
+from mpam_calib.posterior.stored import load_run
 from mpam_calib.run.files import write_csv
-from mpam_calib.run.folder import load_run
 from mpam_calib.units import KPA
 
 Array = NDArray[np.float64]

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from mpam_calib.criticism.journal import Journal
 from mpam_calib.criticism.select import Selection, select
+from mpam_calib.posterior.material import material_of
+from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.report.selection import selection_page
-from mpam_calib.run.calibrate import resolve_material
-from mpam_calib.run.files import RUN_FILE, demand_folder, write_csv
+from mpam_calib.run.files import demand_folder, write_csv
 from mpam_calib.run.folder import run_digest
 from mpam_calib.run.kept import Kept
 from mpam_calib.specimen import read
@@ -30,14 +32,15 @@ def select_to_folder(
     """
     specimen = read(source)
     demand_folder(run, replaces=RUN_FILE)
-    material = resolve_material(specimen)
+    material = material_of(specimen)
     digest = run_digest(
         specimen.digest, command="select", seed=seed, replicates=replicates, material=material
     )
     kept = Kept(run, digest, FILES)
     if kept.finished():
         return None
-    found = select(specimen, seed=seed, replicates=replicates, material=material, tell=tell)
+    journal = Journal(kept.unfinished)
+    found = select(specimen, seed=seed, replicates=replicates, material=material, tell=tell, journal=journal)
     kept.begin()
     write_csv(found.models, run / "models.csv")
     write_csv(found.sensitivity, run / "prior_sensitivity.csv")

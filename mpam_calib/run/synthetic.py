@@ -9,9 +9,9 @@ import pandas as pd
 import tomlkit
 
 from mpam_calib.posterior.checkpoint import write_atomically
+from mpam_calib.posterior.material import keep_material
 from mpam_calib.prediction.simulate import Simulated
 from mpam_calib.run.files import demand_folder, write_csv, write_json
-from mpam_calib.run.folder import keep_material
 from mpam_calib.specimen.recording import BRANCH_WORDS, ForceMap, Loops
 from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 from mpam_calib.units import KPA, MM

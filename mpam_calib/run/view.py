@@ -7,18 +7,20 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mpam_calib.calibration import Calibration
-from mpam_calib.model.model import CONTRACTION_SD, Model
+from mpam_calib.model.model import CONTRACTION_SD
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
 from mpam_calib.posterior.draws import Draws, prior_draws
+from mpam_calib.posterior.material import material_folder
 from mpam_calib.posterior.points import KINDS
-from mpam_calib.prediction.bands import stress_draws
+from mpam_calib.posterior.stored import unconverged
+from mpam_calib.prediction.fitted import fitted_force, fitted_stress, noise_of
 from mpam_calib.prediction.left_out import levels_left_out
+from mpam_calib.prediction.strain_range import strain_range_table
 from mpam_calib.report.view import OBSERVED_COLUMNS, CalibrationView, Convergence
-from mpam_calib.run.folder import NO_TEST, material_folder, unconverged, versions
-from mpam_calib.run.strain_range import strain_range_table
+from mpam_calib.run.folder import versions
 from mpam_calib.specimen.oddities import oddities
 from mpam_calib.units import KPA
 
@@ -70,7 +72,9 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
         headline=headline,
         unidentified=_learnt(summary),
         left_out=levels_left_out(specimen, calibration.target, calibration.draws, calibration.seed),
-        strain_range=strain_range_table(calibration) if model.setting is None else pd.DataFrame(),
+        strain_range=strain_range_table(specimen, model, calibration.draws, calibration.seed)
+        if model.setting is None
+        else pd.DataFrame(),
         settings=_settings(calibration),
         data_files=pd.DataFrame(
             [{"kind": f.kind, "file": f.name, "rows": f.rows} for f in specimen.files],
@@ -140,7 +144,7 @@ def _warnings(calibration: Calibration) -> list[str]:
     warnings = oddities(specimen)
     if material is None:
         return warnings
-    if material.strain_range == NO_TEST:
+    if material.strain_range is None:
         warnings.append(
             "The moduli come from another muscle's run: they are constants of its force curve, not of the "
             "rubber."
@@ -167,7 +171,7 @@ def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
     squares: list[Array] = []
     if data.bins is not None:
         middle = data.bins.middle()
-        fitted, left = _fit(calibration, draws, middle)
+        fitted, left = fitted_force(model, draws, middle)
         rough = float(np.mean(draws.values[ROUGH] ** 2)) if ROUGH in draws.values else 0.0
         frame = _frame("loops", middle, data.bins.force, data.bins.slack, calibration)
         frame["stroke"] = data.bins.segment
@@ -178,7 +182,7 @@ def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
         squares.append((left + rough)[~data.bins.slack])
     if data.points is not None:
         readings = data.points.readings
-        fitted, left = _fit(calibration, draws, readings)
+        fitted, left = fitted_force(model, draws, readings)
         for number, kind in enumerate(KINDS):
             rows = data.points.kind == number
             if not rows.any():
@@ -198,7 +202,7 @@ def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
         frame, left = _tensile_frame(calibration, draws)
         frames.append(frame)
     remainder = float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else float("nan")
-    noise = _noise(draws) if WHITE in draws.values else float("nan")
+    noise = noise_of(draws) if WHITE in draws.values else float("nan")
     if model.setting is None and MISFIT in draws.values:
         remainder = float(np.sqrt(np.mean(left)))
         noise = float(np.mean(draws.values[NOISE]))
@@ -206,53 +210,6 @@ def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
         pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(OBSERVED_COLUMNS))
     )
     return observed.reindex(columns=list(OBSERVED_COLUMNS)), remainder, noise
-
-
-def _noise(draws: Draws) -> float:
-    """Noise (N) of a reading at small forces; of heavy-tailed noise, its scale."""
-    square = draws.values[WHITE] ** 2
-    if CORRELATED in draws.values:
-        square = square + draws.values[CORRELATED] ** 2
-    return float(np.sqrt(np.mean(square)))
-
-
-def _fit(calibration: Calibration, draws: Draws, readings: Readings) -> tuple[Array, Array]:
-    """Mean (n,) of the simulation without its remainder, and the remainder's mean square (n,).
-
-    How the simulation and its remainder share what both can describe is arbitrary: here the simulation
-    has all of it.
-    """
-    model = calibration.model
-    assert model.chain is not None
-    p, q, _ = model.linear_sizes
-    force = model.chain.force(draws.values, draws.eta[:, :p], readings)
-    square = np.zeros(len(readings))
-    if model.remainder is not None:
-        surface = draws.values[SMOOTH] * (draws.eta[:, p : p + q] @ model.remainder.columns(readings).T)
-        taken = _taken_up(surface, _directions(model, draws, readings), _noise(draws))
-        force = force + taken
-        square = np.mean((surface - taken) ** 2, axis=0)
-    return force.mean(axis=0), square
-
-
-def _directions(model: Model, draws: Draws, readings: Readings) -> Array:
-    """How the force (n,) at the posterior's centre changes with each coordinate that moves it (k, n)."""
-    assert model.chain is not None
-    p, d, step = model.linear_sizes[0], len(model.chain.parameters), 0.1
-    u = np.tile(draws.u.mean(axis=0), (d + p + 1, 1))
-    eta = np.tile(draws.eta[:, :p].mean(axis=0), (d + p + 1, 1))
-    u[:d, :d] += step * np.eye(d)
-    eta[d : d + p] += step * np.eye(p)
-    force = model.chain.force(model.values(u), eta, readings)
-    change: Array = (force[:-1] - force[-1]) / step
-    return change
-
-
-def _taken_up(surface: Array, columns: Array, noise: float) -> Array:
-    """The part of a remainder (N, n) that coordinates with columns (k, n) could take up."""
-    gram = columns @ columns.T + noise**2 * np.eye(len(columns))
-    taken: Array = np.linalg.solve(gram, columns @ surface.T).T @ columns
-    return taken
 
 
 def _frame(
@@ -277,15 +234,10 @@ def _frame(
 
 
 def _tensile_frame(calibration: Calibration, draws: Draws) -> tuple[pd.DataFrame, Array]:
-    """The tensile readings beside the law, and the remainder's mean square (n,); see ``_fit``."""
-    tensile, model = calibration.target.data.tensile, calibration.model
-    assert tensile is not None and model.tensile is not None
-    stress = stress_draws(model, draws, tensile.strain, remainder=False)
-    whole = stress_draws(model, draws, tensile.strain)
-    noise = float(np.mean(draws.values[NOISE] ** 2))
-    surface = whole - stress
-    taken = _taken_up(surface, np.abs(stress).max() * model.tensile.powers(tensile.strain).T, noise**0.5)
-    stress, left = stress + taken, np.mean((surface - taken) ** 2, axis=0)
+    """The tensile readings beside the law, and the remainder's mean square (n,)."""
+    tensile = calibration.target.data.tensile
+    assert tensile is not None
+    stress, left = fitted_stress(calibration.model, draws, tensile.strain)
     frame = pd.DataFrame(
         {
             "kind": "tensile",
@@ -294,7 +246,7 @@ def _tensile_frame(calibration: Calibration, draws: Draws) -> tuple[pd.DataFrame
             "contraction": tensile.strain,
             "branch": "",
             "force_N": tensile.stress,
-            "fitted_N": stress.mean(axis=0),
+            "fitted_N": stress,
             "censored": False,
         }
     )

@@ -10,8 +10,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from mpam_calib.errors import InputError
-from mpam_calib.model.effect_ids import forms_of_id, known_effect_ids
 from mpam_calib.specimen.declaration import Declaration, FileKind
+from mpam_calib.specimen.effect_ids import forms_of_id, known_effect_ids
 from mpam_calib.specimen.tables import TABLES
 from mpam_calib.specimen.toml_source import TomlSource
 from mpam_calib.specimen.wording import did_you_mean, listed, quoted, shown

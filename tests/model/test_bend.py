@@ -10,9 +10,9 @@ import pytest
 from mpam_calib.model.bend import BENDS, DRIVERS, MOST
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.effect import Values, bent, effect, known_effects
-from mpam_calib.model.effect_ids import forms_of_id
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.state import Setting, State
+from mpam_calib.specimen.effect_ids import forms_of_id
 
 from . import build
 

@@ -10,11 +10,11 @@ import pytest
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.curves import box_cox
 from mpam_calib.model.effect import effect, known_effects
-from mpam_calib.model.effect_ids import forms_of_id
 from mpam_calib.model.moduli import Law, ModuliBlock
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.kinematics import SHAPES
+from mpam_calib.specimen.effect_ids import forms_of_id
 from mpam_calib.units import si_factor, unit_of
 
 from . import build

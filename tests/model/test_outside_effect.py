@@ -12,12 +12,11 @@ import pytest
 
 from mpam_calib.errors import InputError
 from mpam_calib.model import effect as registry
-from mpam_calib.model import effect_ids
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.effect import Effect, Stage, effect, known_effects, register
 from mpam_calib.model.priors import Normal, Parameter
 from mpam_calib.posterior.target import build_target, locate, predict_force
-from mpam_calib.specimen import read
+from mpam_calib.specimen import effect_ids, read
 
 from . import build
 

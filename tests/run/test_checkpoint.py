@@ -7,12 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from mpam_calib.posterior.bridge import Bridge
 from mpam_calib.posterior.checkpoint import Checkpoint, pack, sweep, unpack, write_atomically
 from mpam_calib.posterior.ensembles import Block, EnsembleState
 from mpam_calib.posterior.mode import Mode
 from mpam_calib.posterior.proposal import StudentMixture
+from mpam_calib.specimen.declaration import Simulation
 
 
 @pytest.fixture
@@ -58,6 +61,17 @@ def test_other_things_that_are_kept_come_back(checkpoint: Checkpoint) -> None:
     np.testing.assert_array_equal(loaded[2].roots, mixture.roots)
 
 
+def test_declarations_named_tuples_sets_and_tables_come_back(checkpoint: Checkpoint) -> None:
+    simulation = Simulation(order=2, law="linear", effects=("dead_band",))
+    table = pd.DataFrame({"level": [1.5, np.nan], "rows": [3, 4], "told": [True, False]})
+    part = [simulation, Bridge(1.0, 0.1), frozenset({"b", "a"}), table]
+    checkpoint.save("part", part)
+    loaded = checkpoint.load("part")
+    assert isinstance(loaded, list)
+    assert loaded[:3] == part[:3] and type(loaded[1]) is Bridge
+    pd.testing.assert_frame_equal(loaded[3], table)
+
+
 def test_what_is_not_there_or_not_ours_is_missing(checkpoint: Checkpoint) -> None:
     assert checkpoint.load("part") is None
     checkpoint.save("part", [1.0])
@@ -96,13 +110,13 @@ def test_a_pickle_is_never_run(checkpoint: Checkpoint, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["os:system", "pathlib:Path", "mpam_calib.cli:main", "mpam_calib.errors:x"])
-def test_only_dataclasses_of_this_package_are_built(
+def test_only_values_of_this_package_are_built(
     name: str, checkpoint: Checkpoint, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from mpam_calib.posterior import checkpoint as module
 
     forged = {"class": name, "fields": {}}
-    monkeypatch.setattr(module, "_encode", lambda part, arrays: forged)
+    monkeypatch.setattr(module, "_encode", lambda part, store: forged)
     payload = pack(None, "digest")
     with pytest.raises(module.Damaged):
         unpack(payload, "digest")

@@ -13,8 +13,8 @@ import pytest
 
 from mpam_calib.design import robust
 from mpam_calib.design.robust import COLUMNS, Optimiser, designs_table
+from mpam_calib.posterior.stored import load_run
 from mpam_calib.report.designs import DesignsView, designs_page
-from mpam_calib.run.folder import load_run
 from mpam_calib.run.optimize import optimize_to_folder
 
 from .command import Here

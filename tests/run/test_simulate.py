@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from mpam_calib.posterior.material import material_of
 from mpam_calib.prediction.simulate import simulate
-from mpam_calib.run.calibrate import resolve_material
 from mpam_calib.specimen import read
 
 from .command import Here, contents, stamps
@@ -85,7 +85,7 @@ def test_a_synthetic_specimen_finds_the_run_of_its_moduli(
     folder = Specimen(simulation=simulation).write(tmp_path / "muscle", loops=loops_text(rows=60))
     made = tmp_path / "deep" / "made"
     assert here("simulate", folder, "-o", made).code == 0
-    assert resolve_material(read(made)) == resolve_material(read(folder))
+    assert material_of(read(made)) == material_of(read(folder))
 
 
 def test_each_synthetic_row_is_one_reading(muscle: Path) -> None:

@@ -6,13 +6,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mpam_calib.calibration import Calibration
+from mpam_calib.model.model import Model
 from mpam_calib.model.reference import rest_of
 from mpam_calib.physics.kinematics import shape_inextensible_braid
 from mpam_calib.physics.statics import gas_force, modulus_columns, thickness_force
+from mpam_calib.posterior.draws import Draws
 from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.curves import first_root
 from mpam_calib.specimen.declaration import Geometry
+from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import KPA
 
 Array = NDArray[np.float64]
@@ -26,13 +28,12 @@ MINIMUM = 20
 """Fewer readings in a range say too little to fit it."""
 
 
-def strain_range_table(calibration: Calibration) -> pd.DataFrame:
+def strain_range_table(specimen: Specimen, model: Model, draws: Draws, seed: int) -> pd.DataFrame:
     """Moduli and what they predict for an MPAM1-shaped muscle, for four strain ranges.
 
     The declared range, its lower half and lower quarter, and all of the test. Laplace's approximation
     around each range's own mode; the declared range is the posterior that was sampled.
     """
-    model, specimen = calibration.model, calibration.specimen
     assert model.tensile is not None and specimen.tensile is not None and model.moduli is not None
     low, high = model.tensile.low, model.tensile.high
     span = high - low
@@ -44,10 +45,10 @@ def strain_range_table(calibration: Calibration) -> pd.DataFrame:
         if inside.sum() < MINIMUM:
             continue
         if number == 0:
-            draws = calibration.draws.thin(DRAWS)
-            moduli = model.moduli.coefficients(draws.eta[:, : model.moduli.size], draws.values)
+            drawn = draws.thin(DRAWS)
+            moduli = model.moduli.coefficients(drawn.eta[:, : model.moduli.size], drawn.values)
         else:
-            moduli = _laplace_moduli(calibration, first, last)
+            moduli = _laplace_moduli(specimen, model, first, last, seed)
         for name, unit, values in _quantities(moduli, model.tensile.convention):
             q05, q95 = np.quantile(values, [0.05, 0.95])
             rows.append([first, last, number == 0, name, unit, values.mean(), q05, q95])
@@ -55,10 +56,10 @@ def strain_range_table(calibration: Calibration) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=columns)
 
 
-def _laplace_moduli(calibration: Calibration, low: float, high: float) -> Array:
-    rng = np.random.default_rng([calibration.seed, 7])
-    blueprint = calibration.model.blueprint.model_copy(update={"tensile_range": (low, high)})
-    target, modes = locate(build_target(calibration.specimen, blueprint), rng)
+def _laplace_moduli(specimen: Specimen, model: Model, low: float, high: float, seed: int) -> Array:
+    rng = np.random.default_rng([seed, 7])
+    blueprint = model.blueprint.model_copy(update={"tensile_range": (low, high)})
+    target, modes = locate(build_target(specimen, blueprint), rng)
     u = rng.multivariate_normal(modes[0].u, modes[0].covariance, DRAWS)
     values = target.model.values(u)
     eta = target.linear_draws(values, rng)

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from mpam_calib.calibration import calibrate
-from mpam_calib.run.view import _taken_up, view_of
+from mpam_calib.prediction.fitted import _taken_up
+from mpam_calib.run.view import view_of
 from mpam_calib.specimen import read
 
 ROOT = Path(__file__).resolve().parents[2]
