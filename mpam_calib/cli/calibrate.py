@@ -9,7 +9,6 @@ import typer
 
 from mpam_calib.cli import NOT_CONVERGED
 from mpam_calib.cli.app import app
-from mpam_calib.errors import Interrupted
 
 
 @app.command()
@@ -38,26 +37,22 @@ def calibrate(
     The same command on an unfinished RUN resumes it and keeps a finished one; other data, another
     model or seed replaces it. Exit code 3: not converged within the budget; a larger one resumes.
     """
-    from mpam_calib.cli.progress import sampling_progress
+    from mpam_calib.cli.progress import resumable, sampling_progress
     from mpam_calib.model.blueprint import Options
     from mpam_calib.run.calibrate import calibrate_to_folder
+    from mpam_calib.run.folder import CHECKPOINT
 
     options = Options(remainder=remainder, correlated_noise=correlated_noise)
-    try:
-        with sampling_progress(max_steps) as listener:
-            outcome = calibrate_to_folder(
-                specimen,
-                output,
-                seed=seed,
-                max_steps=max_steps,
-                ess_wanted=ess,
-                options=options,
-                listener=listener,
-            )
-    except KeyboardInterrupt as error:
-        if not (output / "checkpoint").is_dir():
-            raise Interrupted("interrupted: nothing was drawn yet") from error
-        raise Interrupted("interrupted: what was drawn is kept, the same command goes on from it") from error
+    with resumable(output / CHECKPOINT), sampling_progress(max_steps) as listener:
+        outcome = calibrate_to_folder(
+            specimen,
+            output,
+            seed=seed,
+            max_steps=max_steps,
+            ess_wanted=ess,
+            options=options,
+            listener=listener,
+        )
     what = "kept (same data, model and options)" if outcome.kept else "written"
     print(f"{output / 'report.html'} {what}")
     if not outcome.converged:

@@ -17,11 +17,15 @@ def diagnose(
     output: Annotated[Path, typer.Option("-o", "--output", help="the RUN folder to write")],
     seed: Annotated[int, typer.Option(help="seed of every random choice", min=0)] = 0,
 ) -> None:
-    """Show what the declared simulation gets wrong, name the cause, extend the model, measure the gain."""
-    from mpam_calib.cli.progress import stage_progress
-    from mpam_calib.run.diagnose import diagnose_to_folder
+    """Show what the declared simulation gets wrong, name the cause, extend the model, measure the gain.
 
-    with stage_progress() as tell:
+    The same command goes on where it was interrupted, and keeps what is finished.
+    """
+    from mpam_calib.cli.progress import resumable, stage_progress
+    from mpam_calib.run.diagnose import diagnose_to_folder
+    from mpam_calib.run.kept import UNFINISHED
+
+    with resumable(output / UNFINISHED), stage_progress() as tell:
         found = diagnose_to_folder(specimen, output, seed=seed, tell=tell)
     said = json.loads((output / "diagnosis.json").read_text(encoding="utf-8"))
     causes = ", ".join(cause["id"] for cause in said["causes"])

@@ -17,14 +17,18 @@ def select(
     seed: Annotated[int, typer.Option(help="seed of every random choice", min=0)] = 0,
     replicates: Annotated[int, typer.Option(help="replicates of the confusion matrix (0: none)", min=0)] = 8,
 ) -> None:
-    """Rank orders, laws, frictions, kinematics and strain conventions by evidence and held-out levels."""
+    """Rank orders, laws, frictions, kinematics and strain conventions by evidence and held-out levels.
+
+    The same command goes on where it was interrupted, and keeps what is finished.
+    """
     import pandas as pd
 
-    from mpam_calib.cli.progress import stage_progress
+    from mpam_calib.cli.progress import resumable, stage_progress
     from mpam_calib.report.selection import selection_sentence, short_name
+    from mpam_calib.run.kept import UNFINISHED
     from mpam_calib.run.select import select_to_folder
 
-    with stage_progress() as tell:
+    with resumable(output / UNFINISHED), stage_progress() as tell:
         found = select_to_folder(specimen, output, seed=seed, replicates=replicates, tell=tell)
     models = pd.read_csv(output / "models.csv", keep_default_na=False)
     best = models.iloc[0]

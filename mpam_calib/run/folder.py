@@ -17,6 +17,7 @@ from mpam_calib.posterior.stored import POSTERIOR, RUN_FILE, readable, write_dra
 from mpam_calib.run.files import write_csv, write_json
 from mpam_calib.run.kept import written_over
 
+CHECKPOINT = "checkpoint"
 REPORT = "report.html"
 WRITTEN = (RUN_FILE, POSTERIOR, "summary.csv", "bands.csv", REPORT)
 """What a finished calibration leaves."""
@@ -46,7 +47,7 @@ class RunFolder:
     @property
     def checkpoint(self) -> Checkpoint:
         """Where an unfinished run keeps its blocks."""
-        return Checkpoint(self.path / "checkpoint", self.digest)
+        return Checkpoint(self.path / CHECKPOINT, self.digest)
 
     def state(self) -> dict[str, Any] | None:
         """``run.json`` where it belongs to this digest, else None."""

@@ -12,7 +12,19 @@ from pathlib import Path
 
 import pytest
 
-from .command import PATIENCE, Result, all_gone, contents, finish, kill, living, run, start, wait_for
+from .command import (
+    PATIENCE,
+    Result,
+    all_gone,
+    contents,
+    finish,
+    kill,
+    living,
+    run,
+    stamps,
+    start,
+    wait_for,
+)
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="signals and /proc as Linux has them")
 
@@ -199,3 +211,26 @@ with stage_progress() as tell:
 def test_ctrl_c_that_got_lost_stops_at_the_next_progress() -> None:
     result = subprocess.run([sys.executable, "-c", LOST], capture_output=True, timeout=60, check=False)
     assert (result.returncode, result.stderr) == (130, b"")
+
+
+def test_an_interrupted_diagnosis_goes_on(muscle: Path, tmp_path: Path) -> None:
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    assert run("diagnose", muscle, "-o", whole).code == 0
+    unfinished = broken / "unfinished"
+    for stage, last in enumerate(("call_0002_000", "call_0012_000")):
+        process = start("diagnose", muscle, "-o", broken)
+        before = stamps(unfinished)
+        assert wait_for(process, unfinished / f"{last}.checkpoint")
+        assert {name: stamps(unfinished)[name] for name in before} == before
+        if stage == 0:
+            kill(process)
+            continue
+        os.killpg(process.pid, signal.SIGINT)
+        result = finish(process)
+        assert result.code == 130, result
+        assert result.complaint.startswith("interrupted: what was done is kept")
+        assert not (broken / "diagnosis.json").exists()
+    assert run("diagnose", muscle, "-o", broken).code == 0
+    after = contents(broken)
+    assert not unfinished.exists() and set(after) == set(contents(whole))
+    assert after["diagnosis.json"] == (whole / "diagnosis.json").read_bytes()
