@@ -23,10 +23,12 @@ def reproduce(
     """Recompute every table and number of the thesis and name its misprints."""
     from rich.console import Console
 
+    from mpam_calib.run.files import demand_folder
     from mpam_calib.thesis.page import page
     from mpam_calib.thesis.posterior import MPAM1, MPAM1_STRAND, MPAM2, MuscleBands, missing
     from mpam_calib.thesis.reproduction import reproduce as recompute
 
+    demand_folder(out)
     runs = {MPAM1: mpam1, MPAM2: mpam2, MPAM1_STRAND: mpam1_strand}
     bands = {name: MuscleBands.read(name, run) for name, run in runs.items() if run is not None}
     result = recompute(seed)

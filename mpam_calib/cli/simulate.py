@@ -37,6 +37,8 @@ def _sizes(hide: list[str]) -> dict[str, float | None]:
     sizes: dict[str, float | None] = {}
     for text in hide:
         identifier, equals, number = text.partition("=")
+        if identifier in sizes:
+            raise InputError("--hide", f"{identifier} twice", "each effect once")
         try:
             sizes[identifier] = float(number) if equals else None
         except ValueError as error:

@@ -176,7 +176,8 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
         for side in (-1.0, 1.0)
     ]
     ends = stroke_starts + lengths - 1
-    dt = (loops.time_s[ends] - loops.time_s[stroke_starts]) / np.maximum(lengths - 1, 1)
+    # Strokes of one reading take no time.
+    dt = np.maximum((loops.time_s[ends] - loops.time_s[stroke_starts]) / np.maximum(lengths - 1, 1), 1e-9)
     strokes = np.repeat(np.arange(len(lengths)), lengths)
     repeated = None if memory else Nodes.of_repeated(loops.force_N, rows, strokes, SHARED)
     scatter, chunks = _scatter(loops, starts, stops, segment, position, dt)
@@ -188,7 +189,7 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
         position=position,
         start=loops.time_s[starts],
         stop=loops.time_s[stops - 1],
-        dt=np.maximum(dt, 1e-9),
+        dt=dt,
         slack=_beyond_slack(
             (mean(loops.censored.astype(np.float64)) >= SLACK_SHARE) | beyond[starts],
             displacement,

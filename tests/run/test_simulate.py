@@ -60,6 +60,14 @@ def test_no_friction_cannot_be_changed(effect: str, tmp_path: Path, here: Here) 
     assert here("simulate", folder, "-o", tmp_path / "made", *with_friction).code == 0
 
 
+def test_an_effect_is_hidden_once(muscle: Path, tmp_path: Path, here: Here) -> None:
+    twice = ("--hide", "dead_band=7.5", "--hide", "dead_band")
+    result = here("simulate", muscle, "-o", tmp_path / "made", *twice)
+    assert result.code == 2
+    assert result.complaint == "error: --hide: found dead_band twice, expected each effect once"
+    assert not (tmp_path / "made").exists()
+
+
 def test_only_another_synthetic_specimen_is_replaced(
     muscle: Path, run_copy: Path, tmp_path: Path, here: Here
 ) -> None:

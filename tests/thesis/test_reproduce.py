@@ -76,6 +76,14 @@ def test_file_has_the_columns_and_verdicts_of_the_contract(rows: pd.DataFrame) -
     assert not rows.duplicated(["source", "row", "column"]).any()
 
 
+def test_a_run_is_not_written_over(tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text("{}")
+    result = CliRunner().invoke(app, ["reproduce", "-o", str(tmp_path)])
+    assert isinstance(result.exception, InputError)
+    assert str(result.exception).startswith(f"{tmp_path}: found a calibration's folder")
+    assert [p.name for p in tmp_path.iterdir()] == ["run.json"]
+
+
 def test_every_table_is_in(rows: pd.DataFrame) -> None:
     for name in ("3.2", "3.3", "3.4", "3.5", *(f"4.{i}" for i in range(1, 13))):
         assert (rows["source"] == f"Table {name}").any(), name
