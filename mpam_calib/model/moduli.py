@@ -34,7 +34,7 @@ def rate_parameters(law: str, order: int, levels: Array) -> tuple[Parameter, ...
     """Priors of the rates, in 1/Pa: d of order one over the pressure span, z below it (thesis Eq. 4.8)."""
     span = float(levels[-1] - levels[0]) or float(levels[-1])
     priors: dict[str, Prior] = {"d": Normal(0.0, 2.0 / span), "gap": LogNormal(5.0 / span, 1.0)}
-    meaning = {"d": "the slower rate of the law", "gap": "how much lower the other rate z is"}
+    meaning = {"d": "faster rate of the law", "gap": "how much slower the other rate z is"}
     return tuple(
         Parameter(name, priors[name.split("_")[0]], meaning[name.split("_")[0]], "thesis Eq. 4.8", "1/kPa")
         for name in rate_names(law, order)
@@ -72,6 +72,20 @@ class Law:
         if self.name == "free":
             return [f"E_{k}@{label}" for label in level_labels(self.levels) for k in orders]
         return [f"{letter}_{k}" for letter in letters[self.name] for k in orders]
+
+    def coefficient_meanings(self) -> list[str]:
+        """A few words for each coefficient."""
+        orders = range(1, self.order + 1)
+        if self.name == "constant":
+            return [f"modulus of strain to the power {k}" for k in orders]
+        if self.name == "free":
+            labels = level_labels(self.levels)
+            return [f"modulus of strain to the power {k}, at {at} kPa" for at in labels for k in orders]
+        linear = ("change per unit of pressure", "value at zero pressure")
+        words = (
+            linear if self.name == "linear" else ("weight of the faster rate", "weight of the slower rate")
+        )
+        return [f"modulus E_{k}: {what}" for what in words for k in orders]
 
     def coefficient_units(self) -> list[tuple[str, float]]:
         """(printed unit, SI size) of each coefficient."""

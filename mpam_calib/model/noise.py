@@ -27,7 +27,7 @@ def white_noise_parameter(setting: Setting) -> Parameter:
         prior = LogNormal(setting.force_sd, 0.7)
     else:
         prior = LogNormal(0.003 * setting.force_scale, 1.5)
-    return Parameter(WHITE, prior, "white noise of one force reading")
+    return Parameter(WHITE, prior, "sensor noise of one reading, one sigma")
 
 
 def correlated_noise_parameters(
@@ -40,7 +40,7 @@ def correlated_noise_parameters(
     shortest = SHORTEST * reading_time
     median = 0.3 * (setting.force_sd or 0.003 * setting.force_scale)
     return (
-        Parameter(CORRELATED, LogNormal(median, 1.0), "noise that lasts for a moment"),
+        Parameter(CORRELATED, LogNormal(median, 1.0), "noise that lasts for a moment, one sigma"),
         Parameter(
             TIME, LogUniform(shortest, max(stroke_time / 30.0, 2.0 * shortest)), "how long that moment is"
         ),

@@ -12,6 +12,12 @@ from mpam_calib.model.state import Setting, State
 from mpam_calib.units import si_factor
 
 GEOMETRY = {"L0_mm": "L0", "R0_mm": "R0", "t0_mm": "t0", "alpha0_deg": "alpha0"}
+MEANINGS = {
+    "L0_mm": "length at rest",
+    "R0_mm": "outer radius at rest",
+    "t0_mm": "wall thickness at rest",
+    "alpha0_deg": "braid angle at rest",
+}
 BIAS = "pressure_bias_kPa"
 
 
@@ -23,7 +29,7 @@ def nuisance_parameters(setting: Setting) -> tuple[Parameter, ...]:
         matching = name == "alpha0_deg" and "braid_angle" in setting.simulation.effect_ids
         if sd > 0.0 and not matching:
             prior = Normal(getattr(setting.geometry, attribute), sd)
-            parameters.append(Parameter(name, prior, "declared, uncertain", "specimen.toml"))
+            parameters.append(Parameter(name, prior, MEANINGS[name], "specimen.toml"))
     if setting.pressure_bias_sd > 0.0 and "dead_band" not in setting.simulation.effect_ids:
         # A level at which the muscle was seen to pull had some pressure.
         bias = NormalWithin(0.0, setting.pressure_bias_sd, -setting.pulls_at, np.inf)

@@ -32,7 +32,7 @@ def remainder_parameters(setting: Setting, strokes: bool) -> tuple[Parameter, ..
     Either may be e⁴ times as large, or as small: where the physics is right nothing widens the bands.
     """
     scale = setting.force_scale
-    found = [Parameter(SMOOTH, LogNormal(0.003 * scale, 2.0), "size of what the physics leaves")]
+    found = [Parameter(SMOOTH, LogNormal(0.003 * scale, 2.0), "what the simulation leaves out, one sigma")]
     if strokes:
         found.append(Parameter(ROUGH, LogNormal(0.0006 * scale, 2.0), "the same, for one stroke alone"))
     return tuple(found)

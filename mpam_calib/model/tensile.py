@@ -56,6 +56,10 @@ class TensileModel:
     def parameters(self) -> tuple[Parameter, ...]:
         """Noise and remainder amplitude, Pa."""
         return (
-            Parameter(NOISE, LogNormal(0.002 * self.scale, 2.0), "noise of one stress reading"),
-            Parameter(MISFIT, LogNormal(0.005 * self.scale, 2.0), "what the polynomial leaves of the stress"),
+            Parameter(NOISE, LogNormal(0.002 * self.scale, 2.0), "noise of one stress reading, one sigma"),
+            Parameter(
+                MISFIT,
+                LogNormal(0.005 * self.scale, 2.0),
+                "what the polynomial leaves of the stress, one sigma",
+            ),
         )

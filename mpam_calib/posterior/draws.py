@@ -71,13 +71,17 @@ def _draw_back(task: tuple[Array, list[int]]) -> Array:
 
 @dataclass(frozen=True)
 class Reported:
-    """A quantity as it is printed: its name, unit, draws (N,) in that unit, and its prior's sd."""
+    """A quantity as it is printed: its name, unit, draws (N,) in that unit, and its prior's sd.
+
+    ``meaning`` says what it is, in a few words for a rig engineer.
+    """
 
     name: str
     unit: str
     draws: Array
     prior_sd: float
     sampled: bool
+    meaning: str
 
 
 def reported(model: Model, draws: Draws, seed: int = 0) -> list[Reported]:
@@ -85,6 +89,7 @@ def reported(model: Model, draws: Draws, seed: int = 0) -> list[Reported]:
     found = _coefficients(model, draws, seed)
     for parameter in model.parameters:
         name = parameter.name
+        level = name.partition("@")[2]
         factor = si_factor(name)
         if name.split("_")[0] in ("d", "gap") and parameter.unit == "1/kPa":
             found += _rate(model, draws, name, seed)
@@ -96,6 +101,7 @@ def reported(model: Model, draws: Draws, seed: int = 0) -> list[Reported]:
                 draws.values[name][:, 0] / factor,
                 parameter.prior.sd / factor,
                 True,
+                parameter.meaning + (f", at {level} kPa" if level else ""),
             )
         )
     return found
@@ -110,9 +116,9 @@ def _coefficients(model: Model, draws: Draws, seed: int) -> list[Reported]:
     u, eta = _prior(model, seed)
     prior = model.moduli.coefficients(eta, model.values(u)).std(axis=0)
     return [
-        Reported(name, unit, posterior[:, i] / factor, float(prior[i] / factor), False)
-        for i, (name, (unit, factor)) in enumerate(
-            zip(law.coefficient_names(), law.coefficient_units(), strict=True)
+        Reported(name, unit, posterior[:, i] / factor, float(prior[i] / factor), False, meaning)
+        for i, (name, (unit, factor), meaning) in enumerate(
+            zip(law.coefficient_names(), law.coefficient_units(), law.coefficient_meanings(), strict=True)
         )
     ]
 
@@ -127,7 +133,10 @@ def _rate(model: Model, draws: Draws, name: str, seed: int) -> list[Reported]:
     def rate(values: dict[str, Array]) -> Array:
         return (values[name] if stem == "d" else values[other] - values[name])[:, 0] * KPA
 
-    return [Reported(printed, "1/kPa", rate(draws.values), float(rate(prior).std()), stem == "d")]
+    meaning = (
+        f"{'faster' if stem == 'd' else 'slower'} rate of {f'modulus E_{order}' if order else 'the law'}"
+    )
+    return [Reported(printed, "1/kPa", rate(draws.values), float(rate(prior).std()), stem == "d", meaning)]
 
 
 def _prior(model: Model, seed: int, count: int = 2000) -> tuple[Array, Array]:

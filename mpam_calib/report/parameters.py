@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pandas as pd
 
-from mpam_calib.report.glossary import meaning
 from mpam_calib.report.numbers import fixed, significant, with_band
 from mpam_calib.report.trust import UNIDENTIFIED
 from mpam_calib.report.view import CalibrationView
@@ -29,7 +28,7 @@ def summary_table(view: CalibrationView, names: list[str] | None = None) -> pd.D
         rows.append(
             {
                 "parameter": row["parameter"],
-                "what it is": meaning(str(row["parameter"])),
+                "what it is": view.meanings.get(str(row["parameter"]), ""),
                 "unit": unit,
                 "mean": mean,
                 "90 % band": band,

@@ -70,7 +70,8 @@ class CalibrationView:
     reading has the strain in ``contraction`` and stresses in Pa in the columns of force.
 
     ``draws`` and ``prior_draws``: parameter name to draws, shape (draws,), for the names in
-    ``headline`` (at most eight are shown). ``remainder`` is the root mean square of what the
+    ``headline`` (at most eight are shown), ``meanings`` what each parameter is, in a few words.
+    ``remainder`` is the root mean square of what the
     simulation leaves out and ``noise`` one sigma of the sensor, both in N (Pa for a tensile test);
     nan where not assessed. ``unidentified`` has ``parameter, prior_sd, posterior_sd, contraction``
     (1 − posterior sd / prior sd) ``, sentence``. ``left_out`` has a row for each level that was predicted
@@ -92,6 +93,7 @@ class CalibrationView:
     draws: Mapping[str, Floats] = field(default_factory=dict)
     prior_draws: Mapping[str, Floats] = field(default_factory=dict)
     headline: Sequence[str] = ()
+    meanings: Mapping[str, str] = field(default_factory=dict)
     unidentified: pd.DataFrame = field(default_factory=pd.DataFrame)
     left_out: pd.DataFrame = field(default_factory=pd.DataFrame)
     strain_range: pd.DataFrame = field(default_factory=pd.DataFrame)

@@ -70,6 +70,7 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
         draws=draws,
         prior_draws=prior_draws(model, headline, calibration.seed),
         headline=headline,
+        meanings={item.name: item.meaning for item in calibration.reported},
         unidentified=_learnt(summary),
         left_out=levels_left_out(specimen, calibration.target, calibration.draws, calibration.seed),
         strain_range=strain_range_table(specimen, model, calibration.draws, calibration.seed)

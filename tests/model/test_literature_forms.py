@@ -121,10 +121,10 @@ def test_a_form_says_what_it_is_and_may_be_declared(form: str) -> None:
     own = base.own[name](setting) if name in base.own else ()
     assert len(own) <= 2
     assert all_names == [*shared[: base.leading.get(name)], *(p.name for p in own)]
+    assert all(p.meaning for p in item.parameters(setting))
     for parameter in own:
         assert (parameter.unit == "") == (unit_of(parameter.name) == "")
         assert np.isfinite(parameter.prior.sd) and si_factor(parameter.name) > 0.0
-        assert parameter.meaning
 
 
 @pytest.mark.parametrize("law", ["constant", "linear"])

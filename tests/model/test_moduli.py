@@ -262,6 +262,24 @@ def test_every_level_has_parameters_of_its_own(levels, labels):
     assert model.moduli.law.coefficient_names() == [f"E_1@{label}" for label in labels]
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_every_quantity_of_a_summary_says_what_it_is(law):
+    declared = {"law": law, "order": 2, "friction": "coulomb", "friction_by_pressure": True}
+    model = build_model(build.blueprint(declared, recorded=build.loops([50.0, 100.0, 200.0])))
+    u, eta = np.zeros((3, len(model.names))), np.zeros((3, sum(model.linear_sizes)))
+    listed = {item.name: item.meaning for item in reported(model, Draws(u, model.values(u), eta, 1))}
+    assert all(listed.values())
+    assert listed["K_f@50"] == "Coulomb friction, as a share of the force, at 50 kPa"
+    name, meaning = {
+        "constant": ("E_1", "modulus of strain to the power 1"),
+        "linear": ("b_2", "modulus E_2: value at zero pressure"),
+        "exponential": ("d", "faster rate of the law"),
+        "exponential_each": ("z_2", "slower rate of modulus E_2"),
+        "free": ("E_2@100", "modulus of strain to the power 2, at 100 kPa"),
+    }[law]
+    assert listed[name] == meaning
+
+
 def test_levels_that_are_the_same_have_no_labels():
     with pytest.raises(ValueError, match="not apart"):
         level_labels([1e5, 1e5])

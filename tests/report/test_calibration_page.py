@@ -180,6 +180,11 @@ def test_every_declared_simulation_has_words(view: CalibrationView, moduli: str)
     assert "The simulation:" in words
 
 
+def test_summary_table_says_what_a_parameter_is(view: CalibrationView) -> None:
+    said = replace(view, meanings={"K_f": "Coulomb friction"})
+    assert list(summary_table(said, ["K_f", "tip_factor"])["what it is"]) == ["Coulomb friction", ""]
+
+
 def test_summary_table_keeps_the_order_asked_for(view: CalibrationView) -> None:
     assert list(summary_table(view, ["tip_factor", "K_f"])["parameter"]) == ["tip_factor", "K_f"]
 

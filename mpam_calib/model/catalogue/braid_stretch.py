@@ -13,7 +13,15 @@ from mpam_calib.physics.statics import braid_energy_force, strand_strain
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
-    return (Parameter("braid_factor", HalfLongTailed(2.0), "multiple of Eq. 2.25", "thesis Eq. 2.25", ""),)
+    return (
+        Parameter(
+            "braid_factor",
+            HalfLongTailed(2.0),
+            "energy stored in the strands (theory: 1)",
+            "thesis Eq. 2.25",
+            "",
+        ),
+    )
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:

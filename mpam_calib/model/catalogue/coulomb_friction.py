@@ -16,7 +16,9 @@ SCALE = 0.2
 
 def k_f(name: str = "K_f") -> Parameter:
     """The friction factor's parameter, under its own or a level's name."""
-    return Parameter(name, HalfNormal(SCALE), "friction as a share of the force", "thesis Eq. 2.44", "")
+    return Parameter(
+        name, HalfNormal(SCALE), "Coulomb friction, as a share of the force", "thesis Eq. 2.44", ""
+    )
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:

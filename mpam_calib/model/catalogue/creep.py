@@ -23,7 +23,13 @@ ONSET = 1.0
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (
-        Parameter("creep_per_decade", LongTailed(0.05), "share of the force lost per decade", "", "1/decade"),
+        Parameter(
+            "creep_per_decade",
+            LongTailed(0.05),
+            "relaxation of the force for ten times the time",
+            "",
+            "1/decade",
+        ),
     )
 
 

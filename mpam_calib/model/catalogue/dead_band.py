@@ -23,7 +23,7 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
         # One parameter for both: a dead-band and a gauge's offset are the same in every recording.
         sd = float(np.hypot(setting.pressure_bias_sd, OWN_SD * setting.top_pressure))
     prior = NormalWithin(0.0, sd, -np.inf, setting.pulls_at)
-    return (Parameter("P_DB_kPa", prior, "pressure that does no work", "thesis Eq. 2.45"),)
+    return (Parameter("P_DB_kPa", prior, "pressure that does no work yet", "thesis Eq. 2.45"),)
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:

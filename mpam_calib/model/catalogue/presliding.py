@@ -18,7 +18,7 @@ Apply = Callable[[State, Values, Setting], State]
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     prior = LogNormal(0.02 * setting.stroke, 1.0)
-    return (Parameter("reversal_mm", prior, "travel over which friction turns over"),)
+    return (Parameter("reversal_mm", prior, "travel in which friction turns over after a reversal"),)
 
 
 def _exponential(state: State, values: Values) -> Array:

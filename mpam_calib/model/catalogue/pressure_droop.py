@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
-    return (Parameter("droop_percent", HalfLongTailed(0.05), "pressure missing at full stroke"),)
+    return (
+        Parameter("droop_percent", HalfLongTailed(0.05), "pressure missing in the muscle at full stroke"),
+    )
 
 
 def _drooped(state: State, values: Values, part: Array) -> State:

@@ -18,7 +18,9 @@ Array = NDArray[np.float64]
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (
-        Parameter("rate_per_decade", LongTailed(0.3), "growth of friction per tenfold speed", "", "1/decade"),
+        Parameter(
+            "rate_per_decade", LongTailed(0.3), "change of friction for ten times the speed", "", "1/decade"
+        ),
     )
 
 

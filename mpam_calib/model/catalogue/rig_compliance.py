@@ -15,11 +15,7 @@ from mpam_calib.model.state import Setting, State
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     # 2 % of the length at the force scale: a soft fixture, not a broken one.
     scale = 0.02 * setting.geometry.L0 / setting.force_scale
-    return (
-        Parameter(
-            "compliance_mm_per_N", HalfLongTailed(scale), "shortening that the fixture hides, per newton"
-        ),
-    )
+    return (Parameter("compliance_mm_per_N", HalfLongTailed(scale), "give of the fixture"),)
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:

@@ -23,7 +23,7 @@ SCALE = 0.5
 
 def f_s(name: str = "f_s") -> Parameter:
     """The strand friction's parameter, under its own or a level's name."""
-    return Parameter(name, HalfNormal(SCALE), "coefficient of friction of the strands", "thesis Eq. 2.43", "")
+    return Parameter(name, HalfNormal(SCALE), "friction between the strands", "thesis Eq. 2.43", "")
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:

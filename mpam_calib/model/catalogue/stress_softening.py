@@ -22,9 +22,7 @@ POWERS = ("power", "force-power", "test-power", "test-force-power")
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (
-        Parameter(
-            "first_cycle_fraction", LongTailed(0.2), "extra bladder stiffness in the first cycle", "", ""
-        ),
+        Parameter("first_cycle_fraction", LongTailed(0.2), "how much stiffer the first cycle is", "", ""),
     )
 
 

@@ -20,7 +20,13 @@ from mpam_calib.physics.kinematics import (
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     # The minus sign of Eq. 2.47 is empirical, so the factor may take either.
     return (
-        Parameter("tip_factor", Normal(0.0, 1.0), "share of Eq. 2.47's shortening", "thesis Eq. 2.47", ""),
+        Parameter(
+            "tip_factor",
+            Normal(0.0, 1.0),
+            "how far the rounded tips shorten the muscle (theory: 1)",
+            "thesis Eq. 2.47",
+            "",
+        ),
     )
 
 

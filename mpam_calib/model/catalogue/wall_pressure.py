@@ -11,7 +11,11 @@ from mpam_calib.model.state import Setting, State
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
-    return (Parameter("wall_factor", Normal(0.0, 1.0), "share of the thickness term to take away", "", ""),)
+    return (
+        Parameter(
+            "wall_factor", Normal(0.0, 1.0), "share of the wall's pressure term that is missing", "", ""
+        ),
+    )
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
