@@ -11,6 +11,7 @@ from mpam_calib.criticism.diagnose import Diagnosis
 from mpam_calib.criticism.verdict import BESIDE
 from mpam_calib.model.bend import FORM
 from mpam_calib.model.effect import effect
+from mpam_calib.model.priors import Parameter
 from mpam_calib.report import wording
 from mpam_calib.report.figures import misfit
 from mpam_calib.report.numbers import probability, significant
@@ -56,7 +57,7 @@ FORMS = (
 def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen) -> Page:
     """The page for one diagnosis; ``content`` is that of ``diagnosis.json``."""
     word = found.verdict.word
-    causes, units = content["causes"], _units(found)
+    causes, parameters = content["causes"], _parameters(found)
     lead: list[Block] = [
         Headline(SENTENCES[word]),
         Verdict(_verdict_sentence(content), LEVELS[word], _reasons(content)),
@@ -72,8 +73,8 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
     sections = [
         Section("Misfit budget", _budget(found, content)),
         Section("Where the misfit shows", _structure(content)),
-        Section("Causes", _causes(causes, units)),
-        *([Section("What could hide unseen", _limits(content, units))] if content["limits"] else []),
+        Section("Causes", _causes(causes, parameters)),
+        *([Section("What could hide unseen", _limits(content, parameters))] if content["limits"] else []),
         Section("What else could it be", _alternatives(content, found.verdict.near())),
         Section("Gain on data the fit never saw", _gain(content)),
         Section("What these data cannot test", _not_tested(content)),
@@ -192,27 +193,27 @@ def _budget(found: Diagnosis, content: dict[str, Any]) -> list[Block]:
     ]
 
 
-def _units(found: Diagnosis) -> dict[str, str]:
-    """The unit of every size on the page, by its name."""
+def _parameters(found: Diagnosis) -> dict[str, Parameter]:
+    """Every size on the page by its name."""
     setting = found.problem.model.setting
     assert setting is not None
     forms = (*found.declared_forms, *found.limits)
-    return {p.name: p.printed_unit for form in forms for p in effect(form).parameters(setting)}
+    return {p.name: p for form in forms for p in effect(form).parameters(setting)}
 
 
-def _causes(causes: list[dict[str, Any]], units: dict[str, str]) -> list[Block]:
+def _causes(causes: list[dict[str, Any]], parameters: dict[str, Parameter]) -> list[Block]:
     if not causes:
         return [Text("None is named.")]
     rows = [
         {
             "cause": "" if number else effect(c["id"]).title,
-            "what it means": "" if number else _meaning(c["id"], c["form"]),
+            "what it means": parameters[name].meaning if number else _meaning(c["id"], c["form"]),
             "probability": probability(c["probability"]),
             "parameter": name,
             "mean": values["mean"],
             "5 %": values["q05"],
             "95 %": values["q95"],
-            "unit": units.get(name, ""),
+            "unit": parameters[name].printed_unit if name else "",
             "share of misfit": c["share_of_misfit"],
         }
         for c in causes
@@ -245,7 +246,7 @@ def _alternatives(content: dict[str, Any], near: int) -> list[Block]:
     return [Text(text), DataTable(pd.DataFrame(rows), "Other sets of causes", {"probability": "{}"})]
 
 
-def _limits(content: dict[str, Any], units: dict[str, str]) -> list[Block]:
+def _limits(content: dict[str, Any], parameters: dict[str, Parameter]) -> list[Block]:
     """How large each effect could be without being seen."""
     text = (
         "Nothing was found; that is not to say that nothing is there. Each effect by itself could have any "
@@ -258,7 +259,7 @@ def _limits(content: dict[str, Any], units: dict[str, str]) -> list[Block]:
             "parameter": name,
             "5 %": band["q05"],
             "95 %": band["q95"],
-            "unit": units[name],
+            "unit": parameters[name].printed_unit,
             "what would show it": effect(limit["id"]).told_by,
         }
         for limit in content["limits"]
