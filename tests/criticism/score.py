@@ -38,6 +38,8 @@ HALVED, BENT = "-halved", "-bent"
 """What the name of a set ends in whose effects are halved, or bent."""
 NATS = 10.0
 """Nats by which the oracle must prefer the truth for a case to count as separable."""
+MARGINS = (NATS, 20.0, 50.0, 200.0, float("inf"))
+"""Classes of such margins, nats."""
 
 
 @dataclass(frozen=True)
@@ -197,6 +199,19 @@ def rates(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
     ]
 
 
+def by_margin(scored: list[Scored], which: str) -> list[tuple[str, int, int]]:
+    """Exact sets of the separable cases by how clearly the oracle tells them, as (what, hits, of)."""
+    table = margins.read_margins(plain(which))
+    column = "margin_halved" if which.endswith(HALVED) else "margin"
+    told = [s for s in scored if s.truth and not s.outside and table[s.name][column]]
+    found = []
+    for low, high in pairwise(MARGINS):
+        here = [s for s in told if low <= float(table[s.name][column]) < high]
+        exact = sum(s.word == "named" and s.named == s.truth for s in here)
+        found.append((f"separable by {low:g} to {high:g} nats: exact set named", exact, len(here)))
+    return found
+
+
 def calibration(scored: list[Scored]) -> list[tuple[float, float, int, int]]:
     """Stated probability of the leading set against how often it is the truth: (from, to, hits, cases)."""
     clean = [s for s in scored if not s.outside and s.listed]
@@ -246,7 +261,7 @@ def main(which: str, shard: int = 0, shards: int = 1, workers: int = 2) -> None:
             writer.writerow(_row(scored))
             file.flush()
     everything = [_parsed(row) for row in csv.DictReader(path.open())]
-    for what, hits, of in rates(everything, which):
+    for what, hits, of in rates(everything, which) + by_margin(everything, which):
         low, high = wilson(hits, of)
         share = hits / of if of else float("nan")
         print(f"{what:<52} {hits:>4} of {of:<4} {share:6.1%}  ({low:.1%} to {high:.1%})")
