@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
@@ -11,6 +12,8 @@ from mpam_calib.errors import InputError, Interrupted
 
 DONE, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 130
 """Exit codes."""
+NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
+"""What a full or failing disk says, without a file's name."""
 
 
 def main() -> None:
@@ -33,9 +36,10 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = DONE
     except OSError as error:
-        if error.filename is None:
+        if error.filename is None and error.errno not in NO_ROOM:
             raise
-        code = _refused(f"{error.filename}: found {error.strerror}, expected a place to read or write")
+        where = error.filename or "output"
+        code = _refused(f"{where}: found {error.strerror}, expected a place to read or write")
     except Exception as error:
         # Compiled code may turn Ctrl-C into an error of its own.
         if not ctrl_c.pressed:

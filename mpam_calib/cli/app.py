@@ -25,7 +25,7 @@ app = typer.Typer(
     name="mpam-calib",
     cls=InOrder,
     help="Bayesian calibration of pneumatic artificial muscles.",
-    epilog="SPECIMEN is a specimen folder or its specimen.toml; RUN a folder that calibrate wrote.",
+    epilog="SPECIMEN is a specimen folder or its specimen.toml; RUN a folder of results.",
     add_completion=False,
     pretty_exceptions_enable=False,
     # Plain text: readable in a narrow window and in a log.

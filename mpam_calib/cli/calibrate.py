@@ -37,13 +37,12 @@ def calibrate(
     The same command on an unfinished RUN resumes it and keeps a finished one; other data, another
     model or seed replaces it. Exit code 3: not converged within the budget; a larger one resumes.
     """
-    from mpam_calib.cli.progress import resumable, sampling_progress
+    from mpam_calib.cli.progress import sampling_progress
     from mpam_calib.model.blueprint import Options
     from mpam_calib.run.calibrate import calibrate_to_folder
-    from mpam_calib.run.folder import CHECKPOINT
 
     options = Options(remainder=remainder, correlated_noise=correlated_noise)
-    with resumable(output / CHECKPOINT), sampling_progress(max_steps) as listener:
+    with sampling_progress(max_steps) as listener:
         outcome = calibrate_to_folder(
             specimen,
             output,

@@ -54,12 +54,13 @@ def report(specimen: Specimen, console: Console) -> None:
 
 
 def _files(specimen: Specimen, console: Console) -> None:
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table("file", "kind", "rows", "delimiter", "decimal")
     for file in specimen.files:
         delimiter = "tab" if file.delimiter == "\t" else file.delimiter
-        table.add_row(file.name, file.kind, f"{file.rows}", delimiter, file.decimal)
+        table.add_row(escape(file.name), file.kind, f"{file.rows}", delimiter, file.decimal)
     if specimen.files:
         console.print(table)
 

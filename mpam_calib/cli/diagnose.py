@@ -21,11 +21,10 @@ def diagnose(
 
     The same command goes on where it was interrupted, and keeps what is finished.
     """
-    from mpam_calib.cli.progress import resumable, stage_progress
+    from mpam_calib.cli.progress import stage_progress
     from mpam_calib.run.diagnose import diagnose_to_folder
-    from mpam_calib.run.kept import UNFINISHED
 
-    with resumable(output / UNFINISHED), stage_progress() as tell:
+    with stage_progress() as tell:
         found = diagnose_to_folder(specimen, output, seed=seed, tell=tell)
     said = json.loads((output / "diagnosis.json").read_text(encoding="utf-8"))
     causes = ", ".join(cause["id"] for cause in said["causes"])

@@ -5,26 +5,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mpam_calib.cli import stop_where_pressed
-from mpam_calib.errors import Interrupted
 
 if TYPE_CHECKING:
     from mpam_calib.posterior.sampling import Listener
     from mpam_calib.posterior.sampling import Progress as Figures
-
-
-@contextmanager
-def resumable(kept: Path) -> Iterator[None]:
-    """Whoever interrupts a command is told whether the folder ``kept`` has something to go on from."""
-    try:
-        yield
-    except KeyboardInterrupt as error:
-        if not kept.is_dir():
-            raise Interrupted("interrupted: nothing was done yet") from error
-        raise Interrupted("interrupted: what was done is kept, the same command goes on from it") from error
 
 
 @contextmanager

@@ -40,5 +40,9 @@ def reproduce(
     absent = missing(bands)
     if len(absent):
         names = "; ".join(absent["run"])
-        console.print(f"no posterior given of: {names} (the report's last section says how)", soft_wrap=True)
-    console.print(f"see {out / 'report.html'}", soft_wrap=True)
+        console.print(
+            f"no posterior given of: {names} (the report's last section says how)",
+            soft_wrap=True,
+            markup=False,
+        )
+    console.print(f"see {out / 'report.html'}", soft_wrap=True, markup=False)

@@ -23,12 +23,11 @@ def select(
     """
     import pandas as pd
 
-    from mpam_calib.cli.progress import resumable, stage_progress
+    from mpam_calib.cli.progress import stage_progress
     from mpam_calib.report.selection import selection_sentence, short_name
-    from mpam_calib.run.kept import UNFINISHED
     from mpam_calib.run.select import select_to_folder
 
-    with resumable(output / UNFINISHED), stage_progress() as tell:
+    with stage_progress() as tell:
         found = select_to_folder(specimen, output, seed=seed, replicates=replicates, tell=tell)
     models = pd.read_csv(output / "models.csv", keep_default_na=False)
     best = models.iloc[0]

@@ -27,8 +27,12 @@ def simulate(
     if output.resolve() == source.parent.resolve():
         raise InputError(output, "the specimen's own folder", "another folder")
     demand_synthetic_folder(output)
-    made = make(read(specimen, data_required=False), _sizes(hide or []), seed)
+    real = read(specimen, data_required=False)
+    made = make(real, _sizes(hide or []), seed)
     write_specimen(made, source, output)
+    left = [file.name for file in real.files if file.kind in ("blocked_force", "free_contraction")]
+    if left:
+        print(f"not simulated: {', '.join(left)}")
     print(output / "specimen.toml")
 
 

@@ -1,16 +1,15 @@
 """A journal of finished tasks: an interrupted search or ranking, begun again, reads what was done.
 
 Both hand out their work in the same order each time, and what a task returns depends on nothing but the data
-and the task. So the results need no other name than their number.
+and the task. So results need no other name than the number of their call and of the first task.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from itertools import count
 from typing import TypeVar
 
 from mpam_calib.criticism.problem import Problem
@@ -21,7 +20,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 EVERY = 2.0
-"""Seconds of work that may be lost."""
+"""Seconds after which finished tasks are written down."""
 
 
 @contextmanager
@@ -51,8 +50,7 @@ class Journal:
         self, name: str, spread: Spread, function: Callable[[T], R], tasks: list[T], chunk: int
     ) -> Iterator[R]:
         done = 0
-        numbers = count()
-        while (part := self.checkpoint.load(f"{name}_{(number := next(numbers)):03d}")) is not None:
+        while (part := self.checkpoint.load(f"{name}_{done:06d}")) is not None:
             done += len(part)
             yield from part
         pending: list[R] = []
@@ -61,7 +59,12 @@ class Journal:
             pending.append(result)
             yield result
             if time.monotonic() - saved > EVERY:
-                self.checkpoint.save(f"{name}_{number:03d}", pending)
-                pending, number, saved = [], next(numbers), time.monotonic()
+                self._save(f"{name}_{done:06d}", pending)
+                done, pending, saved = done + len(pending), [], time.monotonic()
         if pending:
-            self.checkpoint.save(f"{name}_{number:03d}", pending)
+            self._save(f"{name}_{done:06d}", pending)
+
+    def _save(self, name: str, results: list[R]) -> None:
+        # Where nothing can be kept the work goes on: it only cannot be resumed.
+        with suppress(OSError):
+            self.checkpoint.save(name, results)

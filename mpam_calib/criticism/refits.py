@@ -28,7 +28,7 @@ def causes_of(found: Fit) -> Set:
 
 def named_forms(found: Fit) -> dict[str, str]:
     """The form of each effect of a fit."""
-    return {e.partition(":")[0]: e for e in found.effects}
+    return {e.partition(":")[0]: e for e in sorted(found.effects)}
 
 
 def ended(found: Fit) -> dict[str, float]:
@@ -75,5 +75,5 @@ def _better(
             found = fit(held_problem(), frozenset(forms), size, start, doubts=doubts)
     except np.linalg.LinAlgError:
         return best
-    found = replace(found, log_evidence=found.log_evidence - sum(map(price, forms)))
+    found = replace(found, log_evidence=found.log_evidence - sum(map(price, sorted(forms))))
     return found if best is None or found.log_evidence > best.log_evidence else best

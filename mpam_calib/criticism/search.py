@@ -228,7 +228,7 @@ class Search:
     @property
     def sets(self) -> list[Set]:
         """All sets seen, best first."""
-        return sorted({key[0] for key in self.fits}, key=lambda s: -self.score(s))
+        return _by({key[0] for key in self.fits}, self.score)
 
 
 def search(
@@ -323,11 +323,16 @@ def _own_names(problem: Problem, effects: Set) -> list[str]:
 
 def _keep(found: Search, count: int, width: int) -> list[Set]:
     """The best sets with this many effects: by posterior, and by fit alone without a remainder."""
-    sets = [s for s in {key[0] for key in found.fits} if len(s) == count]
-    by_score = sorted(sets, key=lambda s: -found.score(s))[:width]
-    bare = [s for s in sets if (s, 0) in found.fits]
-    by_fit = sorted(bare, key=lambda s: -found.fits[s, 0].log_evidence)[: max(width // 2, 1)]
+    sets = {effects for effects, _ in found.fits if len(effects) == count}
+    by_score = _by(sets, found.score)[:width]
+    bare = {s for s in sets if (s, 0) in found.fits}
+    by_fit = _by(bare, lambda s: found.fits[s, 0].log_evidence)[: max(width // 2, 1)]
     return list(dict.fromkeys([*by_score, *by_fit]))
+
+
+def _by(sets: set[Set], figure: Callable[[Set], float]) -> list[Set]:
+    """The sets with the largest figure first, in the same order in every process where figures tie."""
+    return sorted(sets, key=lambda s: (-figure(s), sorted(s)))
 
 
 def _partners(found: Search, effects: Set, singles: list[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Blocks of draws on disk: written whole or not at all, each with the states to resume from.
+"""Parts of unfinished work on disk, written whole or not at all: draws with the states to resume from, fits.
 
 A part is one line of text that seals it, then a zip archive of plain arrays (``.npz``, read without pickle)
 with a JSON text that says how they hang together. Reading one can only build dataclasses, named tuples and
@@ -14,22 +14,25 @@ import io
 import json
 import math
 import os
-import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from mpam_calib.errors import Interrupted
+
 Arrays = dict[str, NDArray[Any]]
 
 HEADER = "mpam-calib checkpoint 3"
 TREE = "tree"
+SUFFIX = ".checkpoint"
 UNFINISHED = ".part"
 """Suffix of a file that is being written; a killed process may leave one behind."""
 PACKAGE = __name__.partition(".")[0]
@@ -80,11 +83,36 @@ class Checkpoint:
             return None
 
     def clear(self) -> None:
-        """Remove all parts."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+        """Remove all parts, whatever their digest, and the folder where nothing else is in it."""
+        for path in self.folder.glob(f"*{SUFFIX}"):
+            path.unlink(missing_ok=True)
+        sweep(self.folder)
+        with suppress(OSError):
+            self.folder.rmdir()
+
+    @property
+    def begun(self) -> bool:
+        """Whether there is a part of this digest."""
+        return any(self._is_own(path) for path in self.folder.glob(f"*{SUFFIX}"))
+
+    @contextmanager
+    def resumable(self) -> Iterator[None]:
+        """Whoever stops the work inside by Ctrl-C is told by ``Interrupted`` whether something is kept."""
+        try:
+            yield
+        except KeyboardInterrupt as error:
+            if not self.begun:
+                raise Interrupted("interrupted: nothing was done yet") from error
+            raise Interrupted(
+                "interrupted: what was done is kept, the same command goes on from it"
+            ) from error
+
+    def _is_own(self, path: Path) -> bool:
+        with path.open("rb") as part:
+            return part.readline().startswith(f"{HEADER} {self.digest} ".encode())
 
     def _path(self, name: str) -> Path:
-        return self.folder / f"{name}.checkpoint"
+        return self.folder / f"{name}{SUFFIX}"
 
 
 def pack(part: Any, digest: str) -> bytes:
@@ -124,12 +152,16 @@ class _Store:
         self._lengths: dict[str, int] = {}
 
     def add(self, array: NDArray[Any]) -> list[Any]:
-        """Keep an array; its kind, where it begins, and its shape."""
+        """Keep an array; its kind, where it begins, its shape and the order of its elements in memory.
+
+        Products of matrices in another order differ in their last bits.
+        """
         kind = array.dtype.str
+        order: Literal["C", "F"] = "F" if array.flags.f_contiguous else "C"
         begin = self._lengths.get(kind, 0)
-        self._kinds.setdefault(kind, []).append(array.ravel())
+        self._kinds.setdefault(kind, []).append(array.ravel(order))
         self._lengths[kind] = begin + array.size
-        return [kind, begin, list(array.shape)]
+        return [kind, begin, list(array.shape), order]
 
     def joined(self) -> Arrays:
         """One array of each kind."""
@@ -150,12 +182,18 @@ def _encode(item: Any, store: _Store) -> Any:
     if type(item) is dict and all(type(key) is str for key in item):
         return {"dict": {key: _encode(value, store) for key, value in item.items()}}
     if type(item) is pd.DataFrame:
-        columns = {str(name): _encode(item[name].to_numpy(), store) for name in item}
-        return {"table": columns}
+        columns = {str(name): item[name] for name in item}
+        return {"table": {name: _encode(_values(column), store) for name, column in columns.items()}}
     if type(item).__module__.split(".")[0] == PACKAGE and (names := _fields(type(item))) is not None:
         fields = {name: _encode(getattr(item, name), store) for name in names}
         return {"class": f"{type(item).__module__}:{type(item).__qualname__}", "fields": fields}
     raise TypeError(f"a checkpoint cannot hold {type(item).__qualname__}")
+
+
+def _values(column: pd.Series[Any]) -> NDArray[Any] | list[Any]:
+    """A table's column: an array, or a list where it holds texts, things of several kinds or nothing."""
+    values = column.to_numpy()
+    return values.tolist() if values.dtype == object else values
 
 
 def _fields(kind: type[Any]) -> list[str] | None:
@@ -194,8 +232,8 @@ def _decode(tree: Any, arrays: Arrays) -> Any:
 
 def _cut(kept: list[Any], arrays: Arrays) -> NDArray[Any]:
     """One of the arrays that lie end to end."""
-    kind, begin, shape = kept
-    return arrays[kind][begin : begin + math.prod(shape)].reshape(shape)
+    kind, begin, shape, order = kept
+    return arrays[kind][begin : begin + math.prod(shape)].reshape(shape, order=order)
 
 
 def _class(name: str) -> type[Any]:

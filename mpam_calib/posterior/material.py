@@ -25,6 +25,12 @@ def material_folder(specimen: Specimen) -> Path | None:
     return (specimen.folder / moduli.removeprefix(PREFIX).strip()).resolve()
 
 
+def demand_other(specimen: Specimen, run: Path) -> None:
+    """Raise ``InputError`` where results would go into the RUN that the moduli come from."""
+    if material_folder(specimen) == run.resolve():
+        raise InputError(run, "the run that the moduli come from", "one of its own for these results")
+
+
 def material_of(specimen: Specimen) -> MaterialPosterior | None:
     """The moduli that the declared RUN found, if one is declared; raises ``InputError`` where it has none."""
     folder = material_folder(specimen)

@@ -86,7 +86,7 @@ def load_run(path: Path) -> StoredRun:
     try:
         state: dict[str, Any] = json.loads((path / RUN_FILE).read_text(encoding="utf-8"))
         blueprint = Blueprint.model_validate(state["blueprint"])
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(path / RUN_FILE, "no finished run", "a folder that calibrate wrote") from error
     try:
         data = az.from_netcdf(str(path / POSTERIOR), engine="h5netcdf")
@@ -106,4 +106,4 @@ def unconverged(path: Path) -> bool:
         state: dict[str, Any] = json.loads((path / RUN_FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    return state.get("converged") is False
+    return isinstance(state, dict) and state.get("converged") is False

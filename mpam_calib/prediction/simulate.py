@@ -58,7 +58,15 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
     fitted = specimen.has_muscle_data
     if not fitted and (specimen.geometry is None or specimen.simulation.E_Pa is None):
         raise InputError(
-            specimen.folder / "specimen.toml", "neither data nor E_Pa", "one of them, to simulate from"
+            specimen.folder / "specimen.toml",
+            "neither a muscle's data nor E_Pa",
+            "one of them, to simulate from",
+        )
+    if fitted and specimen.loops is None and specimen.force_map is None:
+        raise InputError(
+            specimen.folder / "specimen.toml",
+            "neither loops nor a force map",
+            "one of them, whose rows to simulate",
         )
     if fitted:
         blueprint = draw_blueprint(specimen, material=material_of(specimen))

@@ -8,10 +8,10 @@ from pathlib import Path
 from mpam_calib.calibration import calibrate
 from mpam_calib.model.blueprint import Options
 from mpam_calib.posterior.convergence import ESS_WANTED
-from mpam_calib.posterior.material import material_of
+from mpam_calib.posterior.material import demand_other, material_of
 from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Progress
 from mpam_calib.posterior.stored import RUN_FILE
-from mpam_calib.run.files import demand_folder
+from mpam_calib.run.files import KEPT_FILE, demand_folder
 from mpam_calib.run.folder import REPORT, RunFolder, run_digest
 from mpam_calib.specimen import read
 
@@ -40,6 +40,7 @@ def calibrate_to_folder(
     ``InputError`` before anything is written.
     """
     specimen = read(source)
+    demand_other(specimen, run)
     material = material_of(specimen)
     options = options or Options()
     digest = run_digest(
@@ -51,7 +52,7 @@ def calibrate_to_folder(
         material=None if material is None else material.model_dump(),
     )
     folder = RunFolder(run, digest)
-    demand_folder(run, replaces=RUN_FILE)
+    demand_folder(run, RUN_FILE, KEPT_FILE)
     state = folder.state()
     if state is not None and folder.complete():
         used = int(state["sampling"]["steps"])
@@ -60,16 +61,17 @@ def calibrate_to_folder(
             return Outcome(bool(state["converged"]), kept=True)
     tell = listener or (lambda progress: None)
     tell(Progress("fitting", 0, float("nan"), 0.0, 0.0))
-    calibration = calibrate(
-        specimen,
-        seed=seed,
-        max_steps=max_steps,
-        ess_wanted=ess_wanted,
-        options=options,
-        material=material,
-        checkpoint=folder.checkpoint,
-        listener=listener,
-    )
+    with folder.checkpoint.resumable():
+        calibration = calibrate(
+            specimen,
+            seed=seed,
+            max_steps=max_steps,
+            ess_wanted=ess_wanted,
+            options=options,
+            material=material,
+            checkpoint=folder.checkpoint,
+            listener=listener,
+        )
     figures = calibration.sampling.diagnostics
     ess = float(min(figures.ess_bulk.min(), figures.ess_tail.min()))
     steps = calibration.sampling.chain.shape[1]

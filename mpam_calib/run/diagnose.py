@@ -9,17 +9,20 @@ import tomlkit
 
 from mpam_calib.criticism.diagnose import Diagnosis, Tell, describe, diagnose, extended_effects
 from mpam_calib.criticism.journal import Journal
+from mpam_calib.errors import InputError
 from mpam_calib.posterior.checkpoint import write_atomically
-from mpam_calib.posterior.material import keep_material, material_of
+from mpam_calib.posterior.material import demand_other, keep_material, material_of
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.report.diagnosis import diagnosis_page
-from mpam_calib.run.files import demand_folder, write_json
+from mpam_calib.run.files import KEPT_FILE, demand_folder, write_json
 from mpam_calib.run.folder import run_digest
-from mpam_calib.run.kept import Kept
+from mpam_calib.run.kept import UNFINISHED, Kept
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
+from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 
-FILES = ("diagnosis.json", "report.html", "extended/specimen.toml")
+EXTENDED = "extended"
+FILES = ("diagnosis.json", "report.html", f"{EXTENDED}/{SPECIMEN_FILE}")
 
 
 def diagnose_to_folder(
@@ -27,24 +30,39 @@ def diagnose_to_folder(
 ) -> Diagnosis | None:
     """Diagnose a specimen into a RUN folder; None where it is kept, since it holds the same already.
 
-    Raises ``InputError`` before anything is written.
+    What an interruption has left is gone on with. Raises ``InputError`` before anything is written.
     """
     specimen = read(source)
-    demand_folder(run, replaces=RUN_FILE)
+    demand_folder(run, RUN_FILE, KEPT_FILE)
+    demand_other(specimen, run)
     material = material_of(specimen)
     digest = run_digest(specimen.digest, command="diagnose", seed=seed, material=material)
-    kept = Kept(run, digest, FILES)
+    files = (*FILES, *(f"{EXTENDED}/{file.name}" for file in specimen.files))
+    kept = Kept(run, "diagnose", digest, files)
     if kept.finished():
         return None
-    found = diagnose(specimen, material=material, tell=tell, journal=Journal(kept.unfinished))
+    _demand_extended(source, run)
+    with kept.unfinished.resumable():
+        found = diagnose(specimen, material=material, tell=tell, journal=Journal(kept.unfinished))
     kept.begin()
-    toml = source / "specimen.toml" if source.is_dir() else source
-    write_extended(found, specimen, toml, run / "extended")
+    toml = source / SPECIMEN_FILE if source.is_dir() else source
+    write_extended(found, specimen, toml, run / EXTENDED)
     content = describe(found, seed)
     diagnosis_page(found, content, specimen).write(run / "report.html")
     write_json(content, run / "diagnosis.json")
     kept.finish()
     return found
+
+
+def _demand_extended(source: Path, run: Path) -> None:
+    """Raise ``InputError`` where the extended specimen would be written over another, or its own source."""
+    extended = run / EXTENDED
+    folder = source if source.is_dir() else source.parent
+    if folder.resolve().is_relative_to(extended.resolve()):
+        raise InputError(run, f"the folder whose {EXTENDED}/ is diagnosed", "another for these results")
+    own = any((run / name).exists() for name in (KEPT_FILE, "diagnosis.json", UNFINISHED))
+    if (extended / SPECIMEN_FILE).exists() and not own:
+        raise InputError(extended, "a specimen that no diagnosis wrote", "another folder for these results")
 
 
 def write_extended(found: Diagnosis, specimen: Specimen, toml: Path, folder: Path) -> None:
@@ -53,11 +71,10 @@ def write_extended(found: Diagnosis, specimen: Specimen, toml: Path, folder: Pat
     simulation = document.setdefault("simulation", tomlkit.table())
     simulation["effects"] = list(extended_effects(found))
     keep_material(document, specimen, folder)
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     for file in specimen.files:
         destination = folder / file.name
         destination.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(specimen.folder / file.name, destination)
     text = tomlkit.dumps(document)
-    write_atomically(folder / "specimen.toml", lambda p: p.write_text(text, encoding="utf-8"))
+    write_atomically(folder / SPECIMEN_FILE, lambda p: p.write_text(text, encoding="utf-8"))

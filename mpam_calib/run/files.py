@@ -14,18 +14,24 @@ from mpam_calib.posterior.checkpoint import write_atomically
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 
-OWNERS = {SPECIMEN_FILE: "a specimen's folder", RUN_FILE: "a calibration's folder"}
+KEPT_FILE = "kept.json"
+"""The mark of a finished diagnosis or selection, with the digest of each of its files."""
+OWNERS = {
+    SPECIMEN_FILE: "a specimen's folder",
+    RUN_FILE: "a calibration's folder",
+    KEPT_FILE: "a diagnosis's or selection's folder",
+}
 
 
-def demand_folder(path: Path, replaces: str | None = None) -> None:
+def demand_folder(path: Path, *replaces: str) -> None:
     """Raise ``InputError`` where results cannot be written to a folder, or would mix with what others left.
 
-    ``replaces`` names the one of ``OWNERS`` whose folder may be written again.
+    ``replaces`` names those of ``OWNERS`` whose folders may be written again.
     """
     if path.exists() and not path.is_dir():
         raise InputError(path, "a file", "a folder to write into, or a new name")
     for name, owner in OWNERS.items():
-        if name != replaces and (path / name).exists():
+        if name not in replaces and (path / name).exists():
             raise InputError(path, owner, "one of its own for these results")
     there = next(folder for folder in (path.absolute(), *path.absolute().parents) if folder.exists())
     if not there.is_dir():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,17 +13,18 @@ from typing import Any
 import pandas as pd
 
 from mpam_calib.calibration import Calibration
+from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.posterior.checkpoint import Checkpoint, sweep
 from mpam_calib.posterior.stored import POSTERIOR, RUN_FILE, readable, write_draws
 from mpam_calib.run.files import write_csv, write_json
 from mpam_calib.run.kept import written_over
 
-CHECKPOINT = "checkpoint"
 REPORT = "report.html"
 WRITTEN = (RUN_FILE, POSTERIOR, "summary.csv", "bands.csv", REPORT)
 """What a finished calibration leaves."""
 DERIVED = ("predictions.csv", "designs.csv", "designs.html")
 """What later commands add, and what goes when the posterior they came from goes."""
+PACKAGE = Path(__file__).parents[1]
 PACKAGES = ("mpam-calib", "arviz", "emcee", "numpy", "scipy", "pandas")
 
 
@@ -32,9 +34,22 @@ def versions() -> dict[str, str]:
 
 
 def run_digest(specimen_digest: str, **options: Any) -> str:
-    """SHA-256 over data, model, options and versions: what decides whether a RUN can be kept."""
-    content = json.dumps([specimen_digest, options, versions()], sort_keys=True, default=str)
+    """SHA-256 over data, model, options, versions and code: what decides whether a RUN can be kept."""
+    content = json.dumps([specimen_digest, options, versions(), _code()], sort_keys=True, default=str)
     return hashlib.sha256(content.encode()).hexdigest()
+
+
+def _code() -> str:
+    """SHA-256 over this package's files and the modules whose effects were registered from outside.
+
+    A version stays the same while its code is worked on, and says nothing of a laboratory's own effects.
+    """
+    modules = {effect(i).apply.__module__ for i in known_effects()}
+    outside = {getattr(sys.modules.get(name), "__file__", None) for name in modules}
+    files = {Path(file) for file in outside if file}
+    files |= {path for path in PACKAGE.rglob("*") if path.is_file() and path.suffix != ".pyc"}
+    sums = sorted(hashlib.sha256(path.read_bytes()).hexdigest() for path in files)
+    return hashlib.sha256("".join(sums).encode()).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -47,7 +62,7 @@ class RunFolder:
     @property
     def checkpoint(self) -> Checkpoint:
         """Where an unfinished run keeps its blocks."""
-        return Checkpoint(self.path / CHECKPOINT, self.digest)
+        return Checkpoint(self.path / "checkpoint", self.digest)
 
     def state(self) -> dict[str, Any] | None:
         """``run.json`` where it belongs to this digest, else None."""
@@ -55,7 +70,7 @@ class RunFolder:
             content: dict[str, Any] = json.loads((self.path / RUN_FILE).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
-        return content if content.get("digest") == self.digest else None
+        return content if isinstance(content, dict) and content.get("digest") == self.digest else None
 
     def complete(self) -> bool:
         """Whether all that a finished calibration leaves is there, its own page too, and can be read."""

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from mpam_calib.criticism.journal import Journal
 from mpam_calib.criticism.select import Selection, select
-from mpam_calib.posterior.material import material_of
+from mpam_calib.posterior.material import demand_other, material_of
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.report.selection import selection_page
-from mpam_calib.run.files import demand_folder, write_csv
+from mpam_calib.run.files import KEPT_FILE, demand_folder, write_csv
 from mpam_calib.run.folder import run_digest
 from mpam_calib.run.kept import Kept
 from mpam_calib.specimen import read
@@ -28,19 +28,23 @@ def select_to_folder(
 ) -> Selection | None:
     """Rank the model space into a RUN folder; None where it is kept, since it holds the same already.
 
-    Raises ``InputError`` before anything is written.
+    What an interruption has left is gone on with. Raises ``InputError`` before anything is written.
     """
     specimen = read(source)
-    demand_folder(run, replaces=RUN_FILE)
+    demand_folder(run, RUN_FILE, KEPT_FILE)
+    demand_other(specimen, run)
     material = material_of(specimen)
     digest = run_digest(
         specimen.digest, command="select", seed=seed, replicates=replicates, material=material
     )
-    kept = Kept(run, digest, FILES)
+    kept = Kept(run, "select", digest, FILES)
     if kept.finished():
         return None
     journal = Journal(kept.unfinished)
-    found = select(specimen, seed=seed, replicates=replicates, material=material, tell=tell, journal=journal)
+    with kept.unfinished.resumable():
+        found = select(
+            specimen, seed=seed, replicates=replicates, material=material, tell=tell, journal=journal
+        )
     kept.begin()
     write_csv(found.models, run / "models.csv")
     write_csv(found.sensitivity, run / "prior_sensitivity.csv")

@@ -23,7 +23,7 @@ TRUTH = "truth.json"
 
 def demand_synthetic_folder(path: Path) -> None:
     """Raise ``InputError`` where a synthetic specimen cannot be written; only another one is replaced."""
-    demand_folder(path, replaces=SPECIMEN_FILE if (path / TRUTH).exists() else None)
+    demand_folder(path, *([SPECIMEN_FILE] if (path / TRUTH).exists() else []))
 
 
 def write_specimen(simulated: Simulated, source: Path, folder: Path) -> None:

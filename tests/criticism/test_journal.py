@@ -13,7 +13,7 @@ import pytest
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism import journal as module
 from mpam_calib.criticism.journal import Journal
-from mpam_calib.criticism.search import Search, search
+from mpam_calib.criticism.search import Search, _by, search
 from mpam_calib.criticism.select import Selection, select
 from mpam_calib.posterior.checkpoint import Checkpoint
 
@@ -76,6 +76,30 @@ def test_another_digest_starts_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         spread = Journal(Checkpoint(tmp_path, "after")).over(here)
         assert list(spread(worker, range(3))) == [0.0, 1.0, 4.0]
     assert worker.seen == []
+
+
+def test_parts_of_several_attempts_fit_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """How many tasks a part holds depends on the clock, and another digest's parts may have come between."""
+    monkeypatch.setattr(module, "EVERY", -1.0)
+    for digest, deadly in (("a", 9), ("b", 5), ("a", 3)):
+        with pytest.raises(KeyboardInterrupt):
+            list(Journal(Checkpoint(tmp_path, digest)).over(here)(Worker(deadly), range(12)))
+    monkeypatch.setattr(module, "EVERY", 100.0)
+    for digest in ("a", "b", "a"):
+        found = list(Journal(Checkpoint(tmp_path, digest)).over(here)(Worker(), range(12)))
+        assert found == [float(n * n) for n in range(12)]
+
+
+def test_without_room_nothing_is_kept_and_the_work_goes_on(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    spread = Journal(Checkpoint(tmp_path / "file" / "parts", "digest")).over(here)
+    assert list(spread(Worker(), range(3))) == [0.0, 1.0, 4.0]
+
+
+def test_sets_that_tie_have_one_order_in_every_process() -> None:
+    sets = [frozenset(s) for s in (("presliding", "dead_band"), ("dead_band", "rate_friction"), ("creep",))]
+    assert _by(set(sets), lambda s: 0.0) == [sets[2], sets[0], sets[1]]
+    assert _by(set(sets), lambda s: float("dead_band" in s)) == [sets[0], sets[1], sets[2]]
 
 
 def test_a_search_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:

@@ -119,10 +119,10 @@ def all_gone(session: int, seconds: float = 5.0) -> bool:
     return True
 
 
-def wait_for(process: subprocess.Popen[str], path: Path) -> bool:
-    """Wait until a file is there; False where the process ended before."""
+def wait_for(process: subprocess.Popen[str], path: Path, part: str | None = None) -> bool:
+    """Wait until a file is there, or a part below a folder; False where the process ended before."""
     end = time.monotonic() + PATIENCE
-    while not path.exists():
+    while not (path.exists() and (part is None or any(path.rglob(part)))):
         if process.poll() is not None:
             return False
         assert time.monotonic() < end, f"{path} never came"

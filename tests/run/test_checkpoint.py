@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mpam_calib.criticism.held_out import LEVEL_COLUMNS
+from mpam_calib.errors import Interrupted
 from mpam_calib.posterior.bridge import Bridge
 from mpam_calib.posterior.checkpoint import Checkpoint, pack, sweep, unpack, write_atomically
 from mpam_calib.posterior.ensembles import Block, EnsembleState
@@ -70,6 +72,47 @@ def test_declarations_named_tuples_sets_and_tables_come_back(checkpoint: Checkpo
     assert isinstance(loaded, list)
     assert loaded[:3] == part[:3] and type(loaded[1]) is Bridge
     pd.testing.assert_frame_equal(loaded[3], table)
+
+
+def test_tables_of_texts_and_empty_ones_come_back(checkpoint: Checkpoint) -> None:
+    for table in (
+        pd.DataFrame({"model": ["first", None], "rows": [3, 4]}),
+        pd.DataFrame([], columns=LEVEL_COLUMNS),
+    ):
+        checkpoint.save("part", table)
+        pd.testing.assert_frame_equal(checkpoint.load("part"), table)
+
+
+def test_arrays_keep_their_order_in_memory(checkpoint: Checkpoint) -> None:
+    square = np.arange(12.0).reshape(3, 4)
+    checkpoint.save("part", [square, np.asfortranarray(square), square.T])
+    loaded = checkpoint.load("part")
+    assert isinstance(loaded, list)
+    for array, same in zip(loaded, (square, square, square.T), strict=True):
+        np.testing.assert_array_equal(array, same)
+    assert [a.flags.f_contiguous for a in loaded] == [False, True, True]
+
+
+def test_clearing_leaves_what_is_not_a_part(checkpoint: Checkpoint) -> None:
+    checkpoint.save("part", 1.0)
+    assert checkpoint.begun and not Checkpoint(checkpoint.folder, "another").begun
+    (checkpoint.folder / "notes.txt").write_text("mine")
+    checkpoint.clear()
+    assert [p.name for p in checkpoint.folder.iterdir()] == ["notes.txt"]
+    (checkpoint.folder / "notes.txt").unlink()
+    checkpoint.clear()
+    assert not checkpoint.folder.exists() and not checkpoint.begun
+
+
+def test_an_interruption_says_whether_something_is_kept(checkpoint: Checkpoint) -> None:
+    with pytest.raises(Interrupted, match="nothing was done yet"), checkpoint.resumable():
+        raise KeyboardInterrupt
+    checkpoint.save("part", 1.0)
+    with pytest.raises(Interrupted, match="what was done is kept"), checkpoint.resumable():
+        raise KeyboardInterrupt
+    other = Checkpoint(checkpoint.folder, "another")
+    with pytest.raises(Interrupted, match="nothing was done yet"), other.resumable():
+        raise KeyboardInterrupt
 
 
 def test_what_is_not_there_or_not_ours_is_missing(checkpoint: Checkpoint) -> None:

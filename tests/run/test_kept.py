@@ -9,6 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from mpam_calib.run import folder as run_folder
+from mpam_calib.run.kept import Kept
+
 from .command import FAST, RESULTS, Here, contents, stamps
 from .small import loops_text, tensile_text
 
@@ -208,6 +211,68 @@ def test_another_command_s_page_is_not_kept_as_a_calibration_s(
     assert (run_copy / "report.html").read_bytes() == own["report.html"]
     assert "kept" in here("calibrate", muscle, "-o", run_copy).out
     assert "written" in here("diagnose", muscle, "-o", run_copy).out
+
+
+def test_a_diagnosis_leaves_its_source_and_others_specimens_alone(
+    muscle: Path, tmp_path: Path, here: Here
+) -> None:
+    run = tmp_path / "run"
+    own = Path(shutil.copytree(muscle, run / "extended"))
+    before = stamps(run)
+    for source, folder, found in (
+        (own, run, "the folder whose extended/ is diagnosed"),
+        (muscle, own, "a specimen that no diagnosis wrote"),
+    ):
+        result = here("diagnose", source, "-o", run)
+        assert result.code == 2
+        assert result.complaint.startswith(f"error: {folder}: found {found}, expected another")
+        assert stamps(run) == before
+
+
+@pytest.mark.parametrize("command", ["calibrate", "select", "diagnose"])
+def test_results_do_not_replace_the_run_of_the_moduli(
+    command: str, muscle: Path, own_run: Path, tmp_path: Path, here: Here
+) -> None:
+    specimen = Path(shutil.copytree(muscle, tmp_path / "specimen"))
+    declaration = specimen / "specimen.toml"
+    text = declaration.read_text().replace('moduli = "loops"', f'moduli = "run:../{own_run.name}"')
+    declaration.write_text(text.replace('law = "linear"', 'law = "constant"'))
+    before = stamps(own_run)
+    result = here(command, specimen, "-o", own_run)
+    assert result.code == 2
+    assert result.complaint.startswith(f"error: {own_run}: found the run that the moduli come from")
+    assert stamps(own_run) == before
+
+
+def test_a_command_tidies_up_after_itself_alone(tmp_path: Path) -> None:
+    (tmp_path / "unfinished").mkdir()
+    (tmp_path / "unfinished" / "notes.txt").write_text("mine")
+    kept = [
+        Kept(tmp_path, command, digest * 32, ()) for command, digest in (("select", "a"), ("diagnose", "b"))
+    ]
+    older = Kept(tmp_path, "diagnose", "c" * 32, ())
+    for one in (*kept, older):
+        one.unfinished.save("part", 1.0)
+    kept[1].finish()
+    assert kept[0].unfinished.begun and not kept[1].unfinished.begun and not older.unfinished.begun
+    kept[0].finish()
+    assert [p.name for p in (tmp_path / "unfinished").iterdir()] == ["notes.txt"]
+
+
+def test_other_code_is_another_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run_folder, "PACKAGE", tmp_path)
+    (tmp_path / "law.py").write_text("E = 1\n")
+    before = run_folder.run_digest("specimen", seed=0)
+    assert run_folder.run_digest("specimen", seed=0) == before
+    (tmp_path / "law.py").write_text("E = 2\n")
+    assert run_folder.run_digest("specimen", seed=0) != before
+
+
+def test_a_run_file_of_another_kind_is_no_run(tmp_path: Path, here: Here) -> None:
+    (tmp_path / "run.json").write_text("[]")
+    result = here("predict", tmp_path)
+    assert result.code == 2
+    assert "found no finished run" in result.complaint
 
 
 @pytest.mark.parametrize("target", ["nothing", "small"])

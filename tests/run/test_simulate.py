@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -66,6 +68,30 @@ def test_an_effect_is_hidden_once(muscle: Path, tmp_path: Path, here: Here) -> N
     assert result.code == 2
     assert result.complaint == "error: --hide: found dead_band twice, expected each effect once"
     assert not (tmp_path / "made").exists()
+
+
+def test_recordings_without_rows_of_their_own_are_not_simulated(tmp_path: Path, here: Here) -> None:
+    rows = "".join(f"{P},{0.35 * P - 5}\n" for P in range(60, 220, 20))
+    blocked = f"pressure_kPa,force_N\n{rows}"
+    only = Specimen().write(tmp_path / "only", blocked_force=blocked)
+    result = here("simulate", only, "-o", tmp_path / "made")
+    assert result.code == 2
+    assert "found neither loops nor a force map" in result.complaint
+    assert not (tmp_path / "made").exists()
+    beside = Specimen().write(tmp_path / "beside", loops=loops_text(rows=60), blocked_force=blocked)
+    assert "not simulated: blocked_force.csv" in here("simulate", beside, "-o", tmp_path / "made").out
+
+
+def test_a_full_disk_is_one_line(
+    muscle: Path, tmp_path: Path, here: Here, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*arguments: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("mpam_calib.run.synthetic.write_csv", full)
+    result = here("simulate", muscle, "-o", tmp_path / "made")
+    assert result.code == 2
+    assert result.complaint.startswith("error: output: found No space left on device, expected ")
 
 
 def test_only_another_synthetic_specimen_is_replaced(

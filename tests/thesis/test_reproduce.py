@@ -76,12 +76,13 @@ def test_file_has_the_columns_and_verdicts_of_the_contract(rows: pd.DataFrame) -
     assert not rows.duplicated(["source", "row", "column"]).any()
 
 
-def test_a_run_is_not_written_over(tmp_path: Path) -> None:
-    (tmp_path / "run.json").write_text("{}")
+@pytest.mark.parametrize("mark", ["run.json", "kept.json"])
+def test_results_of_other_commands_are_not_written_over(mark: str, tmp_path: Path) -> None:
+    (tmp_path / mark).write_text("{}")
     result = CliRunner().invoke(app, ["reproduce", "-o", str(tmp_path)])
     assert isinstance(result.exception, InputError)
-    assert str(result.exception).startswith(f"{tmp_path}: found a calibration's folder")
-    assert [p.name for p in tmp_path.iterdir()] == ["run.json"]
+    assert str(result.exception).startswith(f"{tmp_path}: found a ")
+    assert [p.name for p in tmp_path.iterdir()] == [mark]
 
 
 def test_every_table_is_in(rows: pd.DataFrame) -> None:
