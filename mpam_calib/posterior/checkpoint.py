@@ -183,7 +183,7 @@ def _encode(item: Any, store: _Store) -> Any:
         return {"dict": {key: _encode(value, store) for key, value in item.items()}}
     if type(item) is pd.DataFrame:
         columns = {str(name): item[name] for name in item}
-        return {"table": {name: _encode(_values(column), store) for name, column in columns.items()}}
+        return {"table": {name: [str(c.dtype), _encode(_values(c), store)] for name, c in columns.items()}}
     if type(item).__module__.split(".")[0] == PACKAGE and (names := _fields(type(item))) is not None:
         fields = {name: _encode(getattr(item, name), store) for name in names}
         return {"class": f"{type(item).__module__}:{type(item).__qualname__}", "fields": fields}
@@ -223,7 +223,9 @@ def _decode(tree: Any, arrays: Arrays) -> Any:
         case "frozenset":
             return frozenset(_decode(value, arrays) for value in content)
         case "table":
-            return pd.DataFrame({key: _decode(value, arrays) for key, value in content.items()})
+            return pd.DataFrame(
+                {key: pd.Series(_decode(v, arrays), dtype=kind) for key, (kind, v) in content.items()}
+            )
         case "dict":
             return {key: _decode(value, arrays) for key, value in content.items()}
         case _:
