@@ -142,7 +142,9 @@ def named(convention: str, seeds: Iterable[int], folder: Path) -> tuple[int, lis
     return right, wrong, count
 
 
-@pytest.mark.parametrize("convention", ["begun_before", "mounted_before"])
+@pytest.mark.parametrize(
+    "convention", [pytest.param("begun_before", marks=pytest.mark.long), "mounted_before"]
+)
 def test_a_cause_by_another_convention_is_named(convention: str, tmp_path: Path) -> None:
     assert named(convention, [1], tmp_path) == (1, [], 1)
 

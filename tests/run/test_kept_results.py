@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from mpam_calib.run.kept import MARK, Kept
+from mpam_calib.run.files import KEPT_FILE
+from mpam_calib.run.kept import Kept
 
 FILES = ("report.html", "extended/specimen.toml")
 
@@ -16,14 +17,14 @@ def kept(tmp_path: Path) -> Kept:
     (tmp_path / "extended").mkdir()
     for name in FILES:
         (tmp_path / name).write_text(name)
-    return Kept(tmp_path, "a digest", FILES)
+    return Kept(tmp_path, "diagnose", "a digest", FILES)
 
 
 def test_what_was_finished_is_kept(kept: Kept) -> None:
     assert not kept.finished()
     kept.finish()
     assert kept.finished()
-    assert not Kept(kept.folder, "another digest", FILES).finished()
+    assert not Kept(kept.folder, "diagnose", "another digest", FILES).finished()
 
 
 def test_what_another_command_wrote_over_is_not(kept: Kept) -> None:
@@ -44,5 +45,5 @@ def test_what_lacks_a_file_or_was_begun_again_is_not(kept: Kept) -> None:
 
 @pytest.mark.parametrize("content", ["", "[]", '{"digest": "a digest"}', "not JSON"])
 def test_a_damaged_mark_keeps_nothing(kept: Kept, content: str) -> None:
-    (kept.folder / MARK).write_text(content)
+    (kept.folder / KEPT_FILE).write_text(content)
     assert not kept.finished()
