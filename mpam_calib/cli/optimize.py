@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from mpam_calib.cli.app import app
+from mpam_calib.cli.warning import warn_unconverged
 
 
 @app.command()
@@ -22,11 +22,9 @@ def optimize(
     posterior mean of blocked force and the one that maximises its 5 % quantile, each with bands on blocked
     force and free contraction, in RUN/designs.csv and RUN/designs.html.
     """
-    from mpam_calib.posterior.stored import unconverged
     from mpam_calib.run.optimize import optimize_to_folder
 
     written = optimize_to_folder(run, seed)
-    if unconverged(run):
-        print(f"warning: {run} did not converge: its bands may be wrong until it has", file=sys.stderr)
+    warn_unconverged(run)
     for path in written:
         print(path)

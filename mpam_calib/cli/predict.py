@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from mpam_calib.cli.app import app
+from mpam_calib.cli.warning import warn_unconverged
 
 
 @app.command()
@@ -27,11 +27,9 @@ def predict(
     Writes bands on force, blocked force and free contraction to RUN/predictions.csv, with the columns
     of bands.csv; what lies beyond the data is marked there as extrapolated.
     """
-    from mpam_calib.posterior.stored import unconverged
     from mpam_calib.run.predict import parse_pressures, predict_to_folder
 
     pressures = None if pressure is None else parse_pressures(pressure)
     written = predict_to_folder(run, pressures, seed)
-    if unconverged(run):
-        print(f"warning: {run} did not converge: its bands may be wrong until it has", file=sys.stderr)
+    warn_unconverged(run)
     print(written)

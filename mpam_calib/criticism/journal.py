@@ -1,7 +1,8 @@
 """A journal of finished tasks: an interrupted search or ranking, begun again, reads what was done.
 
 Both hand out their work in the same order each time, and what a task returns depends on nothing but the data
-and the task. So results need no other name than the number of their call and of the first task.
+and the task. So results need no other name than the number of their call, what was called and the first
+task: ``0012_best_of_000034`` holds what ``best_of``, the twelfth call, returned for its tasks from 34 on.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ class Journal:
 
         def kept(function: Callable[[T], R], tasks: Iterable[T], chunk: int = 1) -> Iterator[R]:
             self.calls += 1
-            return self._results(f"call_{self.calls:04d}", spread, function, list(tasks), chunk)
+            name = getattr(function, "__name__", "results").strip("_")
+            return self._results(f"{self.calls:04d}_{name}", spread, function, list(tasks), chunk)
 
         return kept
 

@@ -217,10 +217,10 @@ def test_an_interrupted_diagnosis_goes_on(muscle: Path, tmp_path: Path) -> None:
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     assert run("diagnose", muscle, "-o", whole).code == 0
     unfinished = broken / "unfinished"
-    for stage, call in enumerate((2, 12)):
+    for stage, call in enumerate((2, 12)):  # the number of a call, as in the names of kept parts
         process = start("diagnose", muscle, "-o", broken)
         before = stamps(unfinished)
-        assert wait_for(process, unfinished, f"call_{call:04d}_*")
+        assert wait_for(process, unfinished, f"{call:04d}_*")
         assert {name: stamps(unfinished)[name] for name in before} == before
         if stage == 0:
             kill(process)

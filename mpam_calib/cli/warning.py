@@ -1,0 +1,14 @@
+"""A warning on standard error, where a result that is used was not to be relied on."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+
+def warn_unconverged(run: Path) -> None:
+    """Say in one line that the sampling of a RUN did not converge, where it did not."""
+    from mpam_calib.posterior.stored import unconverged
+
+    if unconverged(run):
+        print(f"warning: {run} did not converge: its bands may be wrong until it has", file=sys.stderr)
