@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from mpam_calib.errors import InputError
+from mpam_calib.specimen.clock import Clock
 from mpam_calib.specimen.declaration import Geometry
 from mpam_calib.specimen.levels import medians_by_label, setpoint_notes, stroke_levels
 from mpam_calib.specimen.motion import (
@@ -52,15 +52,21 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
     Raises ``InputError`` for anything in a file that cannot be used.
     """
     averaged = rows_per_mean(sum(file.estimated_rows for file in files))
-    frames, counts = [], []
+    frames, clocks = [], []
     for file in files:
-        frame, count = _read_file(file, averaged, floor_N)
+        frame, read = _read_file(file, averaged, floor_N)
         _check_plausible(file, frame, geometry)
         frames.append(frame)
-        counts.append(count)
+        clocks.append(read)
+    counts = [read.rows for read in clocks]
     clock = np.repeat(np.arange(len(frames)), [len(frame) for frame in frames])
     everywhere = set.intersection(*(set(frame.columns) for frame in frames))
-    notes = []
+    notes = [
+        f"loops: {read.repeated} of {read.rows} readings of {read.file.label} have the time of the one "
+        "before; those of a tick are taken as evenly spaced up to the next"
+        for read in clocks
+        if read.coarse
+    ]
     if averaged > 1:
         notes.append(f"loops: {sum(counts)} rows were averaged {averaged} at a time while reading")
     for name in ("setpoint_kPa", "cycle"):
@@ -130,32 +136,16 @@ def one_after_the_other(times: Sequence[Floats]) -> tuple[Floats, Floats]:
     return np.concatenate(found), np.concatenate(began)
 
 
-def _read_file(file: DataFile, averaged: int, floor_N: float | None) -> tuple[pd.DataFrame, int]:
-    """The rows of a file (averaged where it is very large) with a ``censored`` column, and their number."""
+def _read_file(file: DataFile, averaged: int, floor_N: float | None) -> tuple[pd.DataFrame, Clock]:
+    """The rows of a file (averaged where it is very large) with a ``censored`` column, and its clock."""
     kept: list[pd.DataFrame] = []
-    count = 0
-    last_time = -np.inf
-    for block in file.blocks():
-        time = block["time_s"].to_numpy()
-        step = np.diff(time, prepend=last_time)
-        if (step <= 0.0).any():
-            first = int(np.flatnonzero(step <= 0.0)[0])
-            before = time[first - 1] if first else last_time
-            kind = "the time of the row before again" if step[first] == 0.0 else "a step back in time"
-            raise InputError(
-                file.label,
-                f"{time[first]:.10g} after {before:.10g} ({kind})",
-                "a time later than the row before's (a list in [files] where each has its own clock)",
-                int(block.index[first]),
-                "time_s",
-            )
-        last_time = float(time[-1])
-        count += len(block)
+    clock = Clock(file)
+    for block in clock.blocks():
         censored = censored_rows(block, floor_N)
         if averaged > 1:
             block, censored = average_rows(block, averaged, censored)
         kept.append(block.assign(censored=censored.astype(float)))
-    return pd.concat(kept), count
+    return pd.concat(kept), clock
 
 
 def censored_rows(frame: pd.DataFrame, floor_N: float | None) -> Bools:

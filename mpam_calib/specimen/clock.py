@@ -1,0 +1,105 @@
+"""A recording's clock: strictly forward, or in ticks that hold several readings each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpam_calib.errors import InputError
+
+if TYPE_CHECKING:
+    from mpam_calib.specimen.source import DataFile
+
+Floats = NDArray[np.float64]
+
+COARSE = 0.05
+"""Share of rows that repeat the time of the row before, from which the clock is coarse; fewer are a slip."""
+COPIED = 0.5
+"""Share of such rows that repeat everything else as well, from which rows were written twice."""
+EXPECTED = "a time later than the row before's (a list in [files] where each has its own clock)"
+
+
+@dataclass
+class Clock:
+    """The blocks of a file on a strictly forward clock.
+
+    A clock that is written with fewer digits than the readings need repeats itself; the readings of such a
+    tick are taken to be evenly spaced up to the next.
+    """
+
+    file: DataFile
+    rows: int = 0
+    repeated: int = 0
+    copied: int = 0
+    first: tuple[int, float] | None = None
+    """Row and time, s, of the first reading that repeats the time before."""
+
+    def blocks(self) -> Iterator[pd.DataFrame]:
+        """The file's blocks, readings that share a tick spread over it.
+
+        Raises ``InputError`` at a step back in time, and at the first repeated time where there are few, or
+        where most repeat the whole row.
+        """
+        rest: pd.DataFrame | None = None
+        tick = 0.0
+        for block in self.file.blocks():
+            whole = block if rest is None else pd.concat([rest, block])
+            self._count(whole, 0 if rest is None else len(rest))
+            time = whole["time_s"].to_numpy()
+            # The last tick of a block may go on in the next.
+            last = int(np.searchsorted(time, time[-1]))
+            tick = float(time[last] - time[last - 1]) if last else tick
+            rest = whole.iloc[last:]
+            if last:
+                yield whole.iloc[:last].assign(time_s=spread_ticks(time[:last], float(time[last])))
+        assert rest is not None  # a file without rows is refused
+        self._refuse_slips()
+        start = float(rest["time_s"].iloc[0])
+        yield rest.assign(time_s=spread_ticks(rest["time_s"].to_numpy(), start + (tick or 1.0)))
+
+    @property
+    def coarse(self) -> bool:
+        """Whether ticks were spread."""
+        return self.repeated > 0
+
+    def _count(self, block: pd.DataFrame, known: int) -> None:
+        """Count the repeats of a block whose first ``known`` rows have been counted."""
+        time = block["time_s"].to_numpy()
+        step = np.diff(time)
+        back = np.flatnonzero(step < 0.0)
+        if len(back):
+            row = int(back[0]) + 1
+            found = f"{time[row]:.10g} after {time[row - 1]:.10g} (a step back in time)"
+            raise InputError(self.file.label, found, EXPECTED, int(block.index[row]), "time_s")
+        again = np.flatnonzero(step[max(known - 1, 0) :] == 0.0) + max(known - 1, 0) + 1
+        self.rows += len(block) - known
+        self.repeated += len(again)
+        if len(again):
+            values = block.to_numpy()
+            self.copied += int((values[again] == values[again - 1]).all(axis=1).sum())
+            if self.first is None:
+                self.first = int(block.index[again[0]]), float(time[again[0]])
+
+    def _refuse_slips(self) -> None:
+        if self.first is None:
+            return
+        if self.repeated < COARSE * self.rows or self.copied > COPIED * self.repeated:
+            row, time = self.first
+            found = f"{time:.10g} after {time:.10g} (the time of the row before again)"
+            raise InputError(self.file.label, found, EXPECTED, row, "time_s")
+
+
+def spread_ticks(time: Floats, end: float) -> Floats:
+    """Readings at equal times (n,), s, evenly spaced up to the next time, the last of them up to ``end``."""
+    starts = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0.0)
+    if len(starts) == len(time):
+        return time
+    sizes = np.diff(np.append(starts, len(time)))
+    lengths = np.diff(np.append(time[starts], end))
+    within = np.arange(len(time)) - np.repeat(starts, sizes)
+    return time + np.repeat(lengths / sizes, sizes) * within

@@ -1,0 +1,69 @@
+"""Clocks with fewer digits than the readings need, and times that repeat by mistake."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpam_calib.errors import InputError
+from mpam_calib.specimen import blocks, read
+from mpam_calib.specimen.clock import spread_ticks
+
+from .folders import Recording, loops, make
+
+EVERY, TICK = 0.02, 0.1
+"""Seconds between readings, and to which the coarse clock is written."""
+
+
+def recording() -> Recording:
+    return loops((50.0, 100.0, 150.0), cycles=2, rate=1.0 / EVERY, pressure_sd=0.2)
+
+
+def on_ticks(made: Recording) -> Recording:
+    return replace(made, time=np.floor(made.time / TICK + 1e-6) * TICK)
+
+
+def test_readings_of_a_tick_are_spread_over_it() -> None:
+    time = np.array([1.0, 1.0, 2.0, 3.0, 3.0, 3.0, 3.0])
+    assert spread_ticks(time, 5.0).tolist() == [1.0, 1.5, 2.0, 3.0, 3.5, 4.0, 4.5]
+    assert spread_ticks(time[1:4], 4.0).tolist() == [1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize("size", [blocks.BLOCK_BYTES, 1 << 10])
+def test_a_coarse_clock_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int) -> None:
+    """In one block, and where blocks end within ticks."""
+    monkeypatch.setattr(blocks, "BLOCK_BYTES", size)
+    made = recording()
+    fine = read(make(tmp_path / "fine", loops=made.text())).loops
+    specimen = read(make(tmp_path / "coarse", loops=on_ticks(made).text()))
+    coarse = specimen.loops
+    assert fine is not None and coarse is not None
+    assert coarse.time_s == pytest.approx(fine.time_s, abs=EVERY / 2)
+    assert np.all(np.diff(coarse.time_s) > 0.0)
+    assert coarse.stroke.tolist() == fine.stroke.tolist()
+    (note,) = [note for note in specimen.notes if "evenly spaced" in note]
+    share = 1.0 - TICK**-1 * EVERY
+    assert f"of {len(made.time)} readings" in note
+    assert int(note.split()[1]) == pytest.approx(share * len(made.time), abs=5)
+
+
+def test_rows_written_twice_are_refused(tmp_path: Path) -> None:
+    lines = recording().text().splitlines()
+    twice = [lines[0], *(line for line in lines[1:] for _ in range(2))]
+    folder = make(tmp_path, loops="\n".join(twice) + "\n")
+    with pytest.raises(InputError, match=r"loops\.csv:3:time_s: .*again"):
+        read(folder)
+
+
+def test_a_single_repeat_and_a_step_back_are_refused(tmp_path: Path) -> None:
+    made = recording()
+    again, back = made.time.copy(), made.time.copy()
+    again[40], back[-1] = again[39], back[-2] - 0.005
+    for number, (time, words) in enumerate(((again, "again"), (back, "a step back"))):
+        folder = make(tmp_path / str(number), loops=replace(made, time=time).text())
+        row = 42 if words == "again" else len(time) + 1
+        with pytest.raises(InputError, match=rf"loops\.csv:{row}:time_s: .*{words}"):
+            read(folder)
