@@ -1,8 +1,9 @@
 """What the extended model gains on data the fit never saw: search, selection and fit inside every fold.
 
-Folds are whole pressure levels, or whole cycles where the history is the cause. Held-out rows are
-judged together: their joint predictive density knows that neighbours share the remainder and the noise.
-With fewer rows a fold may recognise other causes: those named on all rows are refitted to each fold too.
+Folds are whole pressure levels, or whole cycles where the history is the cause or levels are too few.
+Held-out rows are judged together: their joint predictive density knows that neighbours share the remainder
+and the noise. With fewer rows a fold may recognise other causes: those named on all rows are refitted to each
+fold, too.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ from mpam_calib.model.blueprint import Blueprint
 Array = NDArray[np.float64]
 
 FOLDS = 5
+FEWEST = 3
+"""Levels or cycles of which one can be left out."""
 FOLD_WIDTH = 3
 Z90 = 1.6449
 
@@ -75,10 +78,10 @@ def measure_gain(
     None where nothing can be held out. ``tell`` hears the share done.
     """
     causes = causes_of(named)
-    by_cycle = bool(causes & set(HISTORY)) and len(np.unique(problem.cycle)) > 2
-    groups = problem.cycle if by_cycle else problem.level
-    labels = np.unique(groups)
-    if len(labels) < 3:
+    cycles, levels = np.unique(problem.cycle), np.unique(problem.level)
+    by_cycle = len(cycles) >= FEWEST and (bool(causes & set(HISTORY)) or len(levels) < FEWEST)
+    groups, labels = (problem.cycle, cycles) if by_cycle else (problem.level, levels)
+    if len(labels) < FEWEST:
         return None
     parts = [labels[i::FOLDS] for i in range(min(FOLDS, len(labels)))]
     folds = []

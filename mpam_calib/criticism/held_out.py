@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.gain import FOLDS, Z90, log_density, predict_rows
+from mpam_calib.criticism.gain import FEWEST, FOLDS, Z90, log_density, predict_rows
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.ranking import Ranked, blueprint_of
 from mpam_calib.criticism.spread import held_problem
@@ -17,8 +17,6 @@ from mpam_calib.units import KPA
 
 Array = NDArray[np.float64]
 
-FEWEST = 3
-"""Levels from which one can be left out."""
 LEVEL_COLUMNS = ["pressure_kPa", "rows", "rmse_N", "bias_N", "bias_sd_N", "inside90", "extrapolated"]
 
 

@@ -280,7 +280,7 @@ def _gain(content: dict[str, Any]) -> list[Block]:
     gain = content["gain"]
     if gain is None:
         if content["causes"]:
-            return [Text("Not measured: of fewer than three pressure levels none can be left out.")]
+            return [Text("Not measured: of two pressure levels, or of two cycles, none can be left out.")]
         return [Text("Nothing is named, so there is nothing to gain.")]
     rows = [
         {

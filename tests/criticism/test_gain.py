@@ -10,7 +10,7 @@ from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.gain import Z90, predict_rows
+from mpam_calib.criticism.gain import FEWEST, Z90, measure_gain, predict_rows
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.search import Search
 from mpam_calib.criticism.spread import Alone
@@ -57,6 +57,21 @@ def test_named_causes_are_refitted_in_the_forms_that_were_named(null_problem: Pr
         found.refit_like(known)
         assert found.fits[causes, 0].effects == plain.effects
         assert {size for _, size in found.fits} == set(range(len(SIZES)))
+
+
+def test_of_two_levels_cycles_are_left_out(null_problem: Problem) -> None:
+    """Or nothing is, where there are two cycles as well."""
+    problem = null_problem.take(null_problem.level < 2)
+    softer = problem.force + 0.05 * problem.force_scale * problem.middle().displacement / 1e-2
+    problem = replace(problem, force=softer)
+    tested = ("length_offset", "wall_pressure")
+    named = fit(problem, frozenset(["length_offset"]), 0)
+    gain = measure_gain(problem, tested, named)
+    assert gain is not None
+    assert gain.held_out == "cycle"
+    assert gain.folds == len(np.unique(problem.cycle)) >= FEWEST
+    assert gain.rmse_named < gain.rmse_before
+    assert measure_gain(problem.take(problem.cycle <= 2), tested, named) is None
 
 
 def test_bands_are_no_wider_than_they_need_be(null_problem: Problem) -> None:
