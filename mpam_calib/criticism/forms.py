@@ -13,7 +13,8 @@ rival that must bend in all its parts is not to come close to causes that follow
 
 def flexible(identifier: str) -> tuple[str, ...]:
     """The forms that hold most shapes of an effect, one of every kind."""
-    return tuple(f"{identifier}:{form}" for form in effect(identifier).bent_forms) or (identifier,)
+    item = effect(identifier)
+    return tuple(f"{identifier}:{form}" for form in (*item.bent_forms, *item.scattered)) or (identifier,)
 
 
 def forms_of(identifier: str) -> tuple[str, ...]:

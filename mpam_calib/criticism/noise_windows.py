@@ -10,7 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
+from scipy import stats
 
 from mpam_calib.posterior.sites import usual_chunks
 from mpam_calib.specimen.recording import Loops
@@ -24,8 +26,12 @@ SHORT_DEGREE = 5
 """... or of this one, where a stroke is so short that it is one window."""
 USUAL = 4.0
 """Multiple of the typical power above which a window holds more than noise."""
+CURVE_DEGREE, CURVE_ROWS = 12, 8
+"""Degree of the curve that strokes share, and readings for each degree."""
 FEWEST_PAIRS = 6
 """Pairs of repeated strokes that are enough to tell the noise from."""
+CHANCE = 0.1
+"""Probability by which pairs with a level's first stroke would differ by so much more by chance."""
 ALIKE = 20
 """Strokes repeat each other where their numbers of rows differ by a row, or by one in so many ..."""
 PACE = 0.1
@@ -49,9 +55,9 @@ class Windows(NamedTuple):
         They are far above the typical window, or above those of similar force where noise grows with it.
         """
         if grows:
-            return self._take(usual_chunks(self.chunks, self.force))
+            return self.take(usual_chunks(self.chunks, self.force))
         power = np.mean(self.chunks**2, axis=1)
-        return self._take(power <= USUAL * np.median(power))
+        return self.take(power <= USUAL * np.median(power))
 
     def paces(self) -> list[Windows]:
         """The windows parted by their time steps, which strokes at two speeds may have one each of."""
@@ -60,9 +66,10 @@ class Windows(NamedTuple):
         pace = np.empty(len(log), dtype=np.int64)
         pace[order] = np.cumsum(np.diff(log[order], prepend=log[order[0]]) > PACE)
         kinds, own = np.unique(np.sort(pace.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
-        return [self._take(np.flatnonzero(own.ravel() == kind)) for kind in range(len(kinds))]
+        return [self.take(np.flatnonzero(own.ravel() == kind)) for kind in range(len(kinds))]
 
-    def _take(self, which: NDArray[np.bool_] | Ints) -> Windows:
+    def take(self, which: NDArray[np.bool_] | Ints) -> Windows:
+        """Those picked by a mask or by numbers."""
         return self._replace(chunks=self.chunks[which], force=self.force[which], dt=self.dt[which])
 
     def scatter(self, dt: float) -> tuple[Array, int, Array, float]:
@@ -123,20 +130,52 @@ def between_strokes(loops: Loops) -> Windows | None:
     margins = np.repeat((rows_each - counts * size) // 2, counts)
     starts = np.repeat(begins, counts, axis=0) + (margins + within)[:, None]
     rows = starts[:, :, None] + np.arange(size)
-    difference = (loops.force_N[rows[:, 0]] - loops.force_N[rows[:, 1]]) / np.sqrt(2.0)
+    force = loops.force_N - _shared_curves(loops)
+    difference = (force[rows[:, 0]] - force[rows[:, 1]]) / np.sqrt(2.0)
     dt = np.sort(loops.time_s[rows[:, :, -1]] - loops.time_s[rows[:, :, 0]], axis=1) / (size - 1)
-    return _detrended(difference, loops.force_N[rows].mean(axis=(1, 2)), DEGREE, dt)
+    windows = _detrended(difference, loops.force_N[rows].mean(axis=(1, 2)), DEGREE, dt)
+    new = np.repeat(np.array([pair.new for pair in pairs]), counts)
+    if new.any() and (~new).sum() >= FEWEST_PAIRS:
+        first, others = (windows.chunks[which] ** 2 for which in (new, ~new))
+        # Of noise that is correlated for some readings half of them tell anew.
+        if stats.f.sf(first.mean() / others.mean(), first.size / 2, others.size / 2) < CHANCE:
+            return windows.take(~new)
+    return windows
+
+
+def _shared_curves(loops: Loops) -> Array:
+    """The curve (rows,), N, by place that all strokes of a level and branch share, each beside its own line.
+
+    Where readings of two strokes lie apart, what it does between them would be left in their difference.
+    """
+    curve = np.zeros(len(loops.force_N))
+    for level in np.unique(loops.level):
+        for branch in np.unique(loops.branch):
+            here = np.flatnonzero((loops.level == level) & (loops.branch == branch))
+            x = loops.displacement_m[here]
+            degree = min(CURVE_DEGREE, len(here) // CURVE_ROWS)
+            if degree < 2 or np.ptp(x) == 0.0:
+                continue
+            x = 2.0 * (x - x.min()) / np.ptp(x) - 1.0
+            own = (loops.stroke[here, None] == np.unique(loops.stroke[here])).astype(np.float64)
+            shared = legvander(x, degree)[:, 2:]
+            columns = np.concatenate([shared, own, own * x[:, None]], axis=1)
+            best = np.linalg.lstsq(columns, loops.force_N[here], rcond=None)[0]
+            curve[here] = shared @ best[: shared.shape[1]]
+    return curve
 
 
 class Pair(NamedTuple):
     """Two strokes that repeat each other: from which rows on, for how many, and how far ``apart`` they lie.
 
-    The last is the largest distance of two readings as a share of the stroke.
+    The last is the largest distance of two readings as a share of the stroke. In a ``new`` pair one is the
+    first at its level: no turn preceded it, and friction may build up otherwise there.
     """
 
     begins: tuple[int, int]
     rows: int
     apart: float
+    new: bool = False
 
 
 def _repeated(loops: Loops) -> list[Pair]:
@@ -155,22 +194,25 @@ def _paired(loops: Loops, pace_apart: float) -> list[Pair]:
     """Pairs of strokes of one level and branch, whose paces (logarithms) are so far apart at most."""
     first, length = loops.strokes
     step = (loops.time_s[first + length - 1] - loops.time_s[first]) / np.maximum(length - 1, 1)
-    groups: dict[tuple[int, int], list[tuple[int, float, int]]] = {}
-    for f, n, dt in zip(first.tolist(), length.tolist(), step, strict=True):
+    come = np.diff(loops.level[first], prepend=-1) != 0
+    come |= np.diff(loops.clock[first], prepend=-1) != 0
+    groups: dict[tuple[int, int], list[tuple[int, float, int, bool]]] = {}
+    for f, n, dt, new in zip(first.tolist(), length.tolist(), step, come.tolist(), strict=True):
         if not loops.censored[f : f + n].any():
-            own = (n, float(np.log(max(dt, 1e-9))), f)
+            own = (n, float(np.log(max(dt, 1e-9))), f, new)
             groups.setdefault((int(loops.level[f]), int(loops.branch[f])), []).append(own)
     pairs: list[Pair] = []
     for group in groups.values():
-        waiting: list[tuple[int, float, int]] = []
-        for n, pace, begin in sorted(group):
+        waiting: list[tuple[int, float, int, bool]] = []
+        for n, pace, begin, new in sorted(group):
             waiting = [w for w in waiting if n - w[0] <= max(1, n // ALIKE)]
             other = next((w for w in waiting if abs(pace - w[1]) <= pace_apart), None)
             if other is None:
-                waiting.append((n, pace, begin))
+                waiting.append((n, pace, begin, new))
             else:
                 waiting.remove(other)
-                pairs.append(_aligned(loops.displacement_m, (other[2], other[0]), (begin, n)))
+                pair = _aligned(loops.displacement_m, (other[2], other[0]), (begin, n))
+                pairs.append(pair._replace(new=new or other[3]))
     return pairs
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
+from scipy import stats
 
 from mpam_calib.criticism.fit import Fit, chain_for
 from mpam_calib.criticism.rows import Rows
@@ -18,14 +19,16 @@ Array = NDArray[np.float64]
 
 DEGREE = 6
 """Degree of the curve that is taken out of each stroke."""
-FEWEST = 24
+FEWEST = 10
 """Readings of a stroke that is long enough to be looked at."""
 AWAY = 0.9
 """Middle share of a stroke that is looked at."""
+TOGETHER, FINEST = 8, 400
+"""Readings that share a place on average, and the largest number of places."""
 SHIFTS = 200
 """Random shifts that show what noise alone adds up to."""
-SURE = 6.0
-"""Standard deviations above that."""
+SURE = 1e-9
+"""Probability by which noise alone adds up to as much."""
 
 
 def raw_residual(rows: Rows, blueprint_json: str, fitted: Fit) -> Array:
@@ -44,50 +47,53 @@ def raw_residual(rows: Rows, blueprint_json: str, fitted: Fit) -> Array:
 def repeating_rms(rows: Rows, residual: Array) -> float:
     """Root mean square (N) of the fine structure that a branch's strokes share; 0 where noise explains it.
 
-    ``residual`` (rows,) is what a fit leaves, N.
+    ``residual`` (rows,) is what a fit leaves, N. Strokes whose readings lie at other places tell it together,
+    however few each has. What noise adds up to is told by the same residuals, each stroke's moved on by a
+    random number of readings; a gamma distribution carries that on to where chance ends.
     """
     rng = np.random.default_rng(0)
     found = [0.0]
     for sign in np.unique(rows.readings.sign):
-        profiles = _profiles(rows, residual, rows.readings.sign == sign)
-        if profiles is None:
+        strokes = _detrended(rows, residual, rows.readings.sign == sign)
+        if len(strokes) < 3:
             continue
-        power = _shared(profiles)
-        strokes, grid = profiles.shape
-        shifted = (np.arange(grid) + rng.integers(0, grid, (SHIFTS, strokes, 1))) % grid
-        chance = _shared(profiles[np.arange(strokes)[:, None], shifted])
-        if power > np.mean(chance) + SURE * np.std(chance):
-            found.append(float(power - np.mean(chance)))
+        left = np.concatenate([piece for _, piece in strokes])
+        places = _places(np.concatenate([x for x, _ in strokes]))
+        power = _shared(places, left)
+        sizes = np.array([len(piece) for _, piece in strokes])
+        begins = np.repeat(np.cumsum(sizes) - sizes, sizes)
+        within = np.arange(len(left)) - begins
+        chance = []
+        for _ in range(SHIFTS):
+            moved = np.repeat(rng.integers(0, sizes), sizes)
+            chance.append(_shared(places, left[begins + (within + moved) % np.repeat(sizes, sizes)]))
+        mean, variance = float(np.mean(chance)), float(np.var(chance))
+        if variance > 0.0 and stats.gamma.sf(power, mean**2 / variance, scale=variance / mean) < SURE:
+            found.append(power - mean)
     return float(np.sqrt(max(found)))
 
 
-def _profiles(rows: Rows, residual: Array, here: NDArray[np.bool_]) -> Array | None:
-    """Detrended residuals of a branch's strokes on one grid of positions, (strokes, grid)."""
-    strokes, counts = np.unique(rows.stroke[here], return_counts=True)
-    strokes = strokes[counts >= FEWEST]
-    moves = [np.ptp(rows.readings.displacement[rows.stroke == s]) > 0.0 for s in strokes]
-    strokes = strokes[np.array(moves, dtype=bool)]
-    if len(strokes) < 3:
-        return None
-    reach = float(np.quantile([rows.readings.displacement[rows.stroke == s].max() for s in strokes], 0.1))
-    grid = np.linspace(
-        0.5 * (1.0 - AWAY) * reach,
-        0.5 * (1.0 + AWAY) * reach,
-        int(np.clip(np.median(counts[counts >= FEWEST]), FEWEST, 400)),
-    )
+def _detrended(rows: Rows, residual: Array, here: NDArray[np.bool_]) -> list[tuple[Array, Array]]:
+    """Places (m) and residuals (N) of each stroke of a branch, without its turns and a smooth curve."""
     found = []
-    for s in strokes:
+    for s in np.unique(rows.stroke[here]):
         inside = np.flatnonzero(rows.stroke == s)
         x = rows.readings.displacement[inside]
         # Next to a turn the crosshead hardly moves, and its friction is nobody's model.
         away = np.abs(x - 0.5 * (x.min() + x.max())) < 0.5 * AWAY * np.ptp(x)
-        inside, x = inside[away], x[away]
-        order = np.argsort(x)
-        left = residual[inside] - Polynomial.fit(x, residual[inside], DEGREE)(x)
-        found.append(np.interp(grid, x[order], left[order]))
-    return np.array(found)
+        if away.sum() >= FEWEST:
+            inside, x = inside[away], x[away]
+            found.append((x, residual[inside] - Polynomial.fit(x, residual[inside], DEGREE)(x)))
+    return found
 
 
-def _shared(profiles: Array) -> Array:
-    """Mean square of the mean profile of (..., strokes, grid), N²."""
-    return np.asarray(np.mean(profiles.mean(axis=-2) ** 2, axis=-1))
+def _places(x: Array) -> NDArray[np.int64]:
+    """The place (rows,) of each reading among equal parts of the way."""
+    count = int(np.clip(len(x) // TOGETHER, 1, FINEST))
+    return np.searchsorted(np.linspace(x.min(), x.max(), count + 1)[1:-1], x)
+
+
+def _shared(places: NDArray[np.int64], left: Array) -> float:
+    """Mean square (N²) of what readings (rows,) at one place have in common."""
+    sums, counts = np.bincount(places, left), np.bincount(places)
+    return float(np.sum(sums**2 / np.maximum(counts, 1)) / len(left))

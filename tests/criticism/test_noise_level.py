@@ -139,3 +139,49 @@ def test_strokes_are_compared_where_their_readings_lie_at_one_place() -> None:
     assert windows is not None
     step = np.abs(np.diff(x)).max()
     assert np.abs(windows.chunks).max() < 0.02 * 300.0 * step
+
+
+FEW_ROWS, STEEP, NOISE = 14, 0.06, 0.3
+"""Readings of a stroke, the share of it in which friction turns over, and white noise, N."""
+
+
+def test_noise_is_told_where_few_readings_lie_at_other_places_in_each_stroke() -> None:
+    """Sines with a phase of their own each; friction turns over, but builds up from nothing at first.
+
+    By differences row by row it came out at 1.2 to 1.7 times the true one; now at 1.04 to 1.27.
+    """
+    off = [np.log(_noise_of_few_readings(seed) / NOISE) for seed in range(4)]
+    assert abs(np.mean(off)) < 0.2
+    assert np.max(np.abs(off)) < 0.3
+
+
+def _noise_of_few_readings(seed: int) -> float:
+    specimen = specimen_of("develop-null-003")
+    assert specimen.loops is not None
+    rng = np.random.default_rng(seed)
+    count, cycles = len(specimen.levels_Pa), 6
+    phase = (np.arange(FEW_ROWS) + rng.uniform(0.1, 0.9, (count, 2 * cycles, 1))) / FEW_ROWS
+    branch = np.broadcast_to(np.array([-1, 1])[np.arange(2 * cycles) % 2, None], phase.shape)
+    x = 0.5 * (1.0 + branch * np.cos(np.pi * phase))
+    gone = np.where(branch < 0, x, 1.0 - x)
+    level, stroke, _ = np.indices(phase.shape)
+    held = np.where(stroke == 0, 1.0, 2.0) * np.exp(-gone / STEEP)
+    curve = 40.0 * (1.0 + level) * (1.0 - x) ** 2 + 3.0 * branch * (1.0 - held)
+    rows = np.arange(x.size)
+    loops = replace(
+        specimen.loops,
+        time_s=0.1 * rows,
+        pressure_Pa=specimen.levels_Pa[level.ravel()],
+        displacement_m=5e-3 * x.ravel(),
+        force_N=curve.ravel() + NOISE * rng.standard_normal(x.size),
+        level=level.ravel(),
+        cycle=1 + stroke.ravel() // 2,
+        branch=branch.ravel().copy(),
+        stroke=rows // FEW_ROWS,
+        clock=np.zeros(x.size, dtype=np.int64),
+        began_s=np.zeros(x.size),
+        censored=np.zeros(x.size, dtype=bool),
+        unclear=None,
+        temperature_C=None,
+    )
+    return problem_of(replace(specimen, loops=loops)).noise_level.total

@@ -60,6 +60,22 @@ def _excess(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("offset_excess", Normal(0.0, 0.7), "what is more of it at first, as a share", "", ""),)
 
 
+def _rezeroed(state: State, values: Values, setting: Setting) -> State:
+    """The crosshead is zeroed anew at every level; between levels it is off as on average."""
+    parts = [np.asarray(values[p.name]) for p in _parts(setting)]
+    table = np.concatenate([*parts, sum(parts) / len(parts)], axis=-1)
+    part = table[..., state.readings.level]
+    return replace(state, displacement=state.displacement + values["offset_mm"] * part)
+
+
+def _parts(setting: Setting) -> tuple[Parameter, ...]:
+    prior = Normal(0.5, 1.0)
+    return tuple(
+        Parameter(f"offset_level_{i}", prior, f"share of the offset at level {i}, from the lowest", "", "")
+        for i in range(1, len(setting.levels) + 1)
+    )
+
+
 register(
     Effect(
         id="length_offset",
@@ -71,14 +87,22 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"scale": _scale, "slip": _slip, "settling": _settling, "seating": _seating},
-        own={"slip": _slip_time, "settling": _excess, "seating": _exponent},
+        forms={
+            "scale": _scale,
+            "slip": _slip,
+            "settling": _settling,
+            "seating": _seating,
+            "rezeroed": _rezeroed,
+        },
+        own={"slip": _slip_time, "settling": _excess, "seating": _exponent, "rezeroed": _parts},
         recalls=("slip", "settling"),
+        scattered=("rezeroed",),
         sources={
             "scale": "textbook: gain error of a displacement sensor",
             "slip": "textbook: first-order settling of a clamp, 1 − exp(−t/τ)",
             "settling": "textbook: an offset with an exponential transient, 1 + c·exp(−t/τ)",
             "seating": "textbook: end fittings that seat under pressure, δ·(P/P_middle)^m",
+            "rezeroed": "textbook: repeatability of a zero, an error of its own for each level",
         },
         bends={"contraction": 1, "settling": 3},
     )
