@@ -110,6 +110,25 @@ def test_a_ripple_of_the_drive_repeats(null: tuple[Problem, Fit]) -> None:
     assert found == pytest.approx(size, rel=0.35)
 
 
+@pytest.mark.parametrize("one_in", [2, 3])
+def test_a_ripple_is_told_by_short_strokes_together(one_in: int) -> None:
+    """Of thirty or twenty readings each, at places of their own: none could tell it alone."""
+    specimen = specimen_of("develop-null-003")
+    loops = specimen.loops
+    assert loops is not None
+    first, length = loops.strokes
+    begins = np.random.default_rng(1).integers(0, one_in, len(first))
+    kept = (np.arange(len(loops.force_N)) - np.repeat(first + begins, length)) % one_in == 0
+    problem = problem_of(replace(specimen, loops=loops.without(~kept)))
+    assert problem.rows is not None
+    residual = left(problem, fit(problem, frozenset(), 0))
+    assert repeating_rms(problem.rows, residual) == 0.0
+    x = problem.rows.readings.displacement
+    size = 3.0 * problem.noise_level.total
+    ripple = np.sqrt(2.0) * size * np.sin(2.0 * np.pi * 7.0 * x / x.max())
+    assert repeating_rms(problem.rows, residual + ripple) == pytest.approx(size, rel=0.35)
+
+
 def test_a_saturated_cell_is_seen_and_left_out(specimen: Specimen) -> None:
     loops = specimen.loops
     assert loops is not None

@@ -82,6 +82,11 @@ def _raised(state: State, size: float) -> None:
     state.bends.append(lambda p: np.maximum(1.0 + size * -np.expm1(-2.0 * np.maximum(p, 0.0) / top), 0.02))
 
 
+def _zeroed_anew(state: State, size: float) -> None:
+    """An error of its own at each level, one as likely as the other sign."""
+    state.shortening = state.shortening + size * 1.4 * np.sin(2.4 * (state.rows.level + 1.0))
+
+
 def _by(name: str, effect: str, apply: Callable[[State, float], None]) -> Form:
     return replace(shared_form(effect), name=name, apply=apply, shared=False)
 
@@ -102,6 +107,8 @@ CONVENTIONS: dict[str, Form] = {
         _by("sliding_at_first", "presliding", _sliding_at_first),
         # A level is reached some time before its first reading.
         _by("begun_before", "creep", _begun_before),
+        # The crosshead is zeroed anew at every level.
+        _by("zeroed_anew", "length_offset", _zeroed_anew),
         # Pressure changes the moduli's mean as well.
         _by("raised", "law_shape", _raised),
         # Full stroke is each level's own.
