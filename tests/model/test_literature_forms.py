@@ -119,7 +119,7 @@ def test_a_form_says_what_it_is_and_may_be_declared(form: str) -> None:
     assert item.source == base.sources[name]
     shared, all_names = ([p.name for p in i.parameters(setting)] for i in (base, item))
     own = base.own[name](setting) if name in base.own else ()
-    assert len(own) <= 2
+    assert len(own) <= (len(setting.levels) if name in base.scattered else 2)
     assert all_names == [*shared[: base.leading.get(name)], *(p.name for p in own)]
     assert all(p.meaning for p in item.parameters(setting))
     for parameter in own:
