@@ -69,7 +69,7 @@ def _rezeroed(state: State, values: Values, setting: Setting) -> State:
 
 
 def _parts(setting: Setting) -> tuple[Parameter, ...]:
-    prior = Normal(0.5, 1.0)
+    prior = Normal(1.0, 0.7)
     return tuple(
         Parameter(f"offset_level_{i}", prior, f"share of the offset at level {i}, from the lowest", "", "")
         for i in range(1, len(setting.levels) + 1)
