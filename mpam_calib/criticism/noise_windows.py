@@ -157,12 +157,23 @@ def _shared_curves(loops: Loops) -> Array:
             if degree < 2 or np.ptp(x) == 0.0:
                 continue
             x = 2.0 * (x - x.min()) / np.ptp(x) - 1.0
-            own = (loops.stroke[here, None] == np.unique(loops.stroke[here])).astype(np.float64)
             shared = legvander(x, degree)[:, 2:]
-            columns = np.concatenate([shared, own, own * x[:, None]], axis=1)
-            best = np.linalg.lstsq(columns, loops.force_N[here], rcond=None)[0]
-            curve[here] = shared @ best[: shared.shape[1]]
+            both = _without_lines(np.column_stack([shared, loops.force_N[here]]), x, loops.stroke[here])
+            curve[here] = shared @ np.linalg.lstsq(both[:, :-1], both[:, -1], rcond=None)[0]
     return curve
+
+
+def _without_lines(values: Array, x: Array, stroke: Ints) -> Array:
+    """Values (rows, k) less each stroke's own line along x (rows,)."""
+    starts = np.flatnonzero(np.diff(stroke, prepend=-1))
+    sizes = np.diff(np.append(starts, len(x)))
+
+    def mean(of: Array) -> Array:
+        return np.repeat(np.add.reduceat(of, starts, axis=0) / sizes[:, None], sizes, axis=0)
+
+    along = x[:, None] - mean(x[:, None])
+    values = values - mean(values)
+    return values - along * mean(along * values) / np.maximum(mean(along**2), 1e-12)
 
 
 class Pair(NamedTuple):
