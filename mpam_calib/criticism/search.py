@@ -185,13 +185,18 @@ class Search:
             *(s for k in count for s in [q for q in sets if len(q) == k][:DOUBTED_EACH]),
         }
         chosen |= {frozenset(p) for s in sets[:LEADERS] for p in combinations(sorted(s), max(len(s) - 1, 0))}
-        if frozenset() in sets[:LEADERS]:  # what could hide, though nothing was found?
-            chosen |= {frozenset([e]) for e in self.tested}
+        # What could hide though nothing was found, or nothing further?
+        bases = [s for s in (frozenset[str](), sets[0]) if s in sets[:LEADERS]]
+        chosen |= {further for base in bases for further in self.with_one_more(base)}
         keys = [key for key in self.fits if key[0] in chosen]
         doubted = self.spread(with_doubt, [self.fits[key] for key in keys], chunk=2)
         # A doubt has its price in evidence: who does not pay it cannot be compared with those who do.
         self.searched, self.fits = self.fits, dict(zip(keys, doubted, strict=True))
         self.doubting = True
+
+    def with_one_more(self, effects: Set) -> list[Set]:
+        """The set with each further effect, as far as sets go."""
+        return [effects | {e} for e in self.tested if e not in effects] if len(effects) < LARGEST else []
 
     def on(self, problem: Problem, spread: Spread) -> Search:
         """The leading sets refitted to the same rows with another noise, each from where it ended."""
@@ -307,6 +312,10 @@ def _finish(found: Search, tell: Callable[[float], None]) -> None:
         for size in range(len(SIZES)):
             found.refit_all((effects, size) for effects in [*parts, *leaders])
         _polish(found, [*parts, *leaders])
+    first = found.sets[0]
+    found.refit_all(
+        (further, size) for further in found.with_one_more(first) for size in {0, found.best_size(first)}
+    )
     found.doubt()
 
 

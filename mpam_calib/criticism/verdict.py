@@ -33,8 +33,8 @@ class Verdict:
 
     ``standing`` are the causes that hold even beside a remainder; ``size`` indexes the remainder's size
     under the leading set, which leaves the ``faults``; ``load_cell`` is by how many nats a load cell that
-    gives way beats that set, where it comes near; ``unseen`` are the single causes that the data do not
-    exclude where nothing is found.
+    gives way beats that set, where it comes near; ``unseen`` are the sets with one cause more that the data
+    do not exclude, unless structure is left that would pass for it.
     """
 
     word: Word
@@ -88,18 +88,23 @@ def judge(found: Search) -> Verdict:
         return Verdict("unexplained", leading, standing, probabilities, marginals, size, faults, load_cell)
     if nothing:
         size = found.best_size(frozenset())
-        unseen = frozenset(s for s in sets if len(s) == 1 and _not_excluded(found, s))
+        unseen = _unseen(found, frozenset())
         return Verdict("adequate", frozenset(), frozenset(), probabilities, marginals, size, unseen=unseen)
     lead = scores[0] - scores[1] if len(scores) > 1 else np.inf
     word: Word = "named" if probabilities[leading] >= SURE and lead >= LEAD else "ambiguous"
-    return Verdict(word, leading, leading, probabilities, marginals, size)
+    unseen = _unseen(found, leading)
+    return Verdict(word, leading, leading, probabilities, marginals, size, unseen=unseen)
 
 
-def _not_excluded(found: Search, effects: Set) -> bool:
-    """Whether the data themselves, whatever the prior odds, hardly tell a set from nothing."""
-    nothing: Set = frozenset()
-    gap = found.score(nothing) - found.score(effects)
-    return gap - (found.log_prior(nothing) - found.log_prior(effects)) < BESIDE
+def _unseen(found: Search, base: Set) -> frozenset[Set]:
+    """Sets with one cause more that the data, whatever the prior odds, hardly tell from ``base``."""
+
+    def evidence(effects: Set) -> float:
+        return found.score(effects) - found.log_prior(effects)
+
+    seen = {effects for effects, _ in found.fits}
+    least = evidence(base) - BESIDE
+    return frozenset(s for s in found.with_one_more(base) if s in seen and evidence(s) > least)
 
 
 def _structure_left(found: Search, leading: Set, size: int) -> bool:

@@ -13,7 +13,7 @@ from mpam_calib.criticism.fit import fit
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.search import Search
 from mpam_calib.criticism.spread import Alone
-from mpam_calib.criticism.verdict import Verdict, judge
+from mpam_calib.criticism.verdict import LISTED, Verdict, judge
 
 CAUSE = frozenset(["length_offset"])
 NOTHING: frozenset[str] = frozenset()
@@ -88,3 +88,21 @@ def test_others_are_listed_however_far_behind(margins: range, listed: int, near:
     verdict = Verdict("named", CAUSE, CAUSE, {CAUSE: 1.0, **behind}, {}, 0)
     assert list(verdict.others()) == list(behind)[:listed]
     assert verdict.near() == near
+
+
+@pytest.mark.parametrize(("gap", "listed"), [(9.0, True), (11.0, False)])
+def test_a_further_cause_that_the_data_do_not_exclude_is_listed(
+    problem: Problem, gap: float, listed: bool
+) -> None:
+    """Whatever its prior odds are, and behind however many others."""
+    found = search_where_the_cause_leaves(problem, 0.1)
+    first = found.fits[CAUSE, 0]
+    others = [f"effect_{i}" for i in range(2 * LISTED + 1)]
+    for i, other in enumerate([*others, "creep"]):
+        behind = gap if other == "creep" else 0.1 * i
+        fitted = replace(first, log_evidence=first.log_evidence - behind)
+        found.fits[CAUSE | {other}, 0] = fitted
+    found.tested = (*CAUSE, "creep")
+    verdict = judge(found)
+    assert verdict.word == "named"
+    assert ((CAUSE | {"creep"}) in verdict.others()) == listed
