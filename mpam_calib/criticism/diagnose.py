@@ -12,7 +12,7 @@ import numpy as np
 from mpam_calib.criticism.budget import Budget, misfit_budget
 from mpam_calib.criticism.candidates import Candidates, candidates
 from mpam_calib.criticism.gain import Gain, measure_gain
-from mpam_calib.criticism.journal import Journal
+from mpam_calib.criticism.journal import Journal, journalled
 from mpam_calib.criticism.limits import Band, hidden_sizes
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.refits import Set
@@ -43,7 +43,7 @@ class Diagnosis:
     structure: list[tuple[Structure, Structure]]
     """Every test of structure before and after."""
     limits: dict[str, Band]
-    """How large each effect could be unseen (SI), where nothing is found."""
+    """How large each further effect could be unseen (SI), where nothing is left that would pass for it."""
 
     @property
     def causes(self) -> list[str]:
@@ -89,7 +89,10 @@ def diagnose(
         )
     fits = [found.fits[s, found.best_size(s)] for s in (frozenset(), verdict.standing)]
     structure = list(zip(*(structure_tests(problem, f) for f in fits), strict=True))
-    limits = hidden_sizes(problem, tested.tested) if verdict.word == "adequate" else {}
+    limits = {}
+    if verdict.word in ("adequate", "named"):
+        with journalled(problem, WORKERS, journal) as spread:
+            limits = hidden_sizes(problem, tested.tested, fits[1], spread)
     return Diagnosis(problem, tested, found, verdict, budget, gain, structure, limits)
 
 

@@ -71,6 +71,14 @@ def doubt_columns(
     return doubts(chain_for(key, effects), without, values, eta, readings, guide)
 
 
+def doubt_on_rows(climb: Climb, place: Place, key: str, effects: frozenset[str]) -> Array:
+    """The same columns on a problem's rows (n, r), with sizes and force as a climb has them at a place."""
+    readings, first, second = climb.problem.lean
+    eta = place.eta[: climb.chain.linear_size]
+    columns = doubt_columns(key, effects, climb.values(place.u[None]), eta, readings, place.guide)
+    return 0.5 * (columns[first] + columns[second])
+
+
 def fit(
     problem: Problem,
     effects: frozenset[str],
@@ -94,9 +102,7 @@ def fit(
     if not effects or not doubts:
         return plain
     # A doubt is in proportion to the sizes found so far; with it they settle once more.
-    readings, first, second = problem.lean
-    columns = doubt_columns(key, effects, climb.values(place.u[None]), place.eta, readings, place.guide)
-    columns = 0.5 * (columns[first] + columns[second])
+    columns = doubt_on_rows(climb, place, key, effects)
     found = []
     for doubt in doubts:
         if doubt == 0.0:

@@ -1,8 +1,8 @@
-"""What could hide where nothing is found: how large each effect may be, by itself, without being seen.
+"""What could hide beside what is found: how large each effect may be, by itself, without being seen.
 
-"Adequate" says that no cause was shown, not that there is none. The posterior of one effect's size beside
-the declared simulation, with Laplace's integral over all else at every value of the size, says how much of it
-these data leave room for.
+"Adequate" says that no cause was shown, not that there is none, and causes that are named may not be all. The
+posterior of one effect's size beside the declared simulation and the causes named, with Laplace's integral
+over all else at every value of the size, says how much of it these data leave room for.
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from scipy import integrate, interpolate, linalg
 
 from mpam_calib.criticism.climb import Climb, Place, furthest_of
-from mpam_calib.criticism.fit import chain_for
+from mpam_calib.criticism.fit import Fit, chain_for, doubt_on_rows
 from mpam_calib.criticism.problem import Problem
+from mpam_calib.criticism.refits import ended, named_forms
+from mpam_calib.criticism.spread import Alone, Spread, held_problem
 from mpam_calib.model.effect import effect
 
 Array = NDArray[np.float64]
@@ -30,40 +32,74 @@ FEWEST, MOST_POINTS, FINE = 3, 400, 2000
 EXCLUDED = 5.0
 """Nats behind the best kind of an effect (whose clock, which force) from which on a kind is left out."""
 
+NOTHING: frozenset[str] = frozenset()
 Band = tuple[float, float]
 
 
-def hidden_sizes(problem: Problem, effects: Iterable[str]) -> dict[str, Band]:
+def hidden_sizes(
+    problem: Problem, effects: Iterable[str], named: Fit, spread: Spread | None = None
+) -> dict[str, Band]:
     """The 90 % band (SI) of the size of each effect that has just one parameter.
 
-    The noise is all that is beside it: what a remainder may hold could hide anything. An effect of several
-    kinds has the band that holds those of all its kinds.
+    Beside it are noise, the causes that are ``named`` and the doubt about their forms, but no remainder: what
+    that may hold could hide anything. An effect of several kinds has the band that holds those of all.
     """
     setting = problem.model.setting
     assert setting is not None
+    kinds = [
+        kind
+        for e in effects
+        if e not in named_forms(named)
+        for kind in (e, *(f"{e}:{name}" for name in effect(e).kinds))
+        if len(effect(kind).parameters(setting)) == 1
+    ]
+    doubt = _doubt(problem, named)
+    tasks = [(named, doubt, kind) for kind in kinds]
+    found: dict[str, list[tuple[float, Band]]] = {}
+    for kind, band in zip(kinds, (spread or Alone(problem))(_band, tasks), strict=True):
+        if band is not None:
+            found.setdefault(kind.partition(":")[0], []).append(band)
     bands = {}
-    for e in effects:
-        kinds = (e, *(f"{e}:{kind}" for kind in effect(e).kinds))
-        found = [
-            f for kind in kinds if len(effect(kind).parameters(setting)) == 1 and (f := _band(problem, kind))
-        ]
-        if found:
-            best = max(evidence for evidence, _ in found)
-            lows, highs = zip(*(band for evidence, band in found if evidence > best - EXCLUDED), strict=True)
-            bands[e] = (min(lows), max(highs))
+    for e, of_kinds in found.items():
+        best = max(evidence for evidence, _ in of_kinds)
+        lows, highs = zip(*(band for evidence, band in of_kinds if evidence > best - EXCLUDED), strict=True)
+        bands[e] = (min(lows), max(highs))
     return bands
 
 
-def _band(problem: Problem, form: str) -> tuple[float, Band] | None:
+def _beside(problem: Problem, named: Fit, doubt: Array, further: frozenset[str] = NOTHING) -> Climb:
+    """A climb of the causes named and further ones, beside a doubt about the former (n, r), N."""
+    chain = chain_for(problem.blueprint.model_dump_json(), named.effects | further)
+    return Climb(problem, chain, 0, doubt)
+
+
+def _mode(climb: Climb, named: Fit) -> Place:
+    """Where the climb ends that begins where the causes named ended."""
+    start = ended(named)
+    u = np.array([start.get(name, 0.0) for name in climb.names], dtype=np.float64)
+    return climb.climb(u, climb.guide(), np.zeros(climb.chain.linear_size))
+
+
+def _doubt(problem: Problem, named: Fit) -> Array:
+    """What the forms of the causes named may get wrong: columns (n, r), N, with coefficients N(0, 1)."""
+    none = np.empty((len(problem), 0))
+    if named.doubt_sd == 0.0:
+        return none
+    climb = _beside(problem, named, none)
+    key = problem.blueprint.model_dump_json()
+    return named.doubt_sd * doubt_on_rows(climb, _mode(climb, named), key, named.effects)
+
+
+def _band(task: tuple[Fit, Array, str]) -> tuple[float, Band] | None:
     """The log evidence (up to a constant) and the band; None where no muscle has this effect."""
-    setting = problem.model.setting
+    named, doubt, form = task
+    climb = _beside(held_problem(), named, doubt, frozenset([form]))
+    setting = climb.problem.model.setting
     assert setting is not None
     (own,) = effect(form).parameters(setting)
-    chain = chain_for(problem.blueprint.model_dump_json(), frozenset([form]))
-    climb = Climb(problem, chain, 0, np.empty((len(problem), 0)))
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # of shapes that no muscle has
-            mode = climb.climb(np.zeros(len(climb.names)), climb.guide(), np.zeros(chain.linear_size))
+            mode = _mode(climb, named)
             points, found = _walk(climb, mode, climb.names.index(own.name))
     except (np.linalg.LinAlgError, ValueError):  # scipy's word for slopes that are not finite
         return None
@@ -85,6 +121,7 @@ def _walk(climb: Climb, mode: Place, i: int) -> tuple[Array, Array]:
     step = min(float(np.sqrt(covariance[i, i])) / STEPS, WIDEST)
     furthest = float(furthest_of(climb.chain.parameters)[i])
     found = {float(mode.u[i]): (top := _log_density(climb, mode, i))}
+    p = climb.chain.linear_size
     for direction in (-step, step):
         place = mode
         for _point in range(MOST_POINTS):
@@ -92,7 +129,7 @@ def _walk(climb: Climb, mode: Place, i: int) -> tuple[Array, Array]:
             u[i] += direction
             if abs(u[i]) > furthest:
                 break
-            place = climb.look_with_its_signs(u, place.guide, place.eta)
+            place = climb.look_with_its_signs(u, place.guide, place.eta[:p])
             if not np.isfinite(place.objective):  # no muscle
                 break
             place = _eased(climb, place, i)
@@ -120,7 +157,7 @@ def _eased(climb: Climb, place: Place, i: int) -> Place:
         return place
     u = place.u.copy()
     u[others[sizes]] += linalg.solve(hessian, gradient, assume_a="pos")[sizes]
-    better = climb.look_with_its_signs(u, place.guide, place.eta)
+    better = climb.look_with_its_signs(u, place.guide, place.eta[: climb.chain.linear_size])
     return better if better.objective > place.objective else place
 
 

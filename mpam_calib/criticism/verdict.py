@@ -48,10 +48,14 @@ class Verdict:
     unseen: frozenset[Set] = frozenset()
 
     def others(self) -> dict[Set, float]:
-        """The five likeliest sets besides the standing one, more that come near, to ten, and the unseen."""
+        """The likeliest sets besides the standing one, best first, and among the rest the unseen."""
         others = [s for s in self.probabilities if s != self.standing]
-        first = max(LISTED, min(self.near(), 2 * LISTED))
+        first = self.likeliest()
         return {s: self.probabilities[s] for i, s in enumerate(others) if i < first or s in self.unseen}
+
+    def likeliest(self) -> int:
+        """How many other sets are listed for their probability: five, more that come near, to ten."""
+        return max(LISTED, min(self.near(), 2 * LISTED))
 
     def near(self) -> int:
         """How many sets, neither the standing one nor the likeliest, come within ``BESIDE`` nats of this."""

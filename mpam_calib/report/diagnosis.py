@@ -75,7 +75,7 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
         Section("Where the misfit shows", _structure(content)),
         Section("Causes", _causes(causes, parameters)),
         *([Section("What could hide unseen", _limits(content, parameters))] if content["limits"] else []),
-        Section("What else could it be", _alternatives(content, found.verdict.near())),
+        Section("What else could it be", _alternatives(content, found)),
         Section("Gain on data the fit never saw", _gain(content)),
         Section("What these data cannot test", _not_tested(content)),
         Section("Simulation", [Text(wording.simulation_sentence(specimen.simulation))]),
@@ -233,23 +233,30 @@ def _meaning(identifier: str, form: str) -> str:
     return f"{item.sentence} ({'; '.join(words)})" if words else item.sentence
 
 
-def _alternatives(content: dict[str, Any], near: int) -> list[Block]:
+def _alternatives(content: dict[str, Any], found: Diagnosis) -> list[Block]:
+    near, shown = found.verdict.near(), found.verdict.likeliest()
     text = f"Sets within {BESIDE:g} nats of the likeliest, hardly told from it here: {near or 'none'}."
+    if more := len(content["alternatives"][shown:]):
+        text += (
+            f" Sets with one cause more, less likely beforehand, that the data do not exclude either: {more} "
+            "(in diagnosis.json)."
+        )
     rows = [
         {
             "set": ", ".join(a["ids"]) or "nothing beyond the declared simulation",
             "probability": probability(a["probability"]),
             "what would tell them apart": _telling(set(a["ids"]), {c["id"] for c in content["causes"]}),
         }
-        for a in content["alternatives"]
+        for a in content["alternatives"][:shown]
     ]
     return [Text(text), DataTable(pd.DataFrame(rows), "Other sets of causes", {"probability": "{}"})]
 
 
 def _limits(content: dict[str, Any], parameters: dict[str, Parameter]) -> list[Block]:
     """How large each effect could be without being seen."""
+    found = "Beside the causes named nothing was found" if content["causes"] else "Nothing was found"
     text = (
-        "Nothing was found; that is not to say that nothing is there. Each effect by itself could have any "
+        f"{found}; that is not to say that nothing is there. Each effect by itself could have any "
         "size inside its 90 % band and these data would look the same. Where such a size would "
         "matter to you, make the measurement beside it."
     )

@@ -13,7 +13,7 @@ from mpam_calib.run.diagnose import diagnose_to_folder
 from mpam_calib.specimen import read
 
 CASE = "develop-separable-016"
-"""Coulomb friction and a dead-band of another form, hidden in a muscle with tensile moduli."""
+"""Coulomb friction and a dead-band, hidden in a muscle with tensile moduli."""
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +31,20 @@ def test_the_hidden_causes_are_named(runs: tuple[Path, frozenset[str]]) -> None:
     assert {cause["id"] for cause in content["causes"]} == runs[1]
     assert all(cause["probability"] >= 0.95 for cause in content["causes"])
     assert sum(cause["share_of_misfit"] for cause in content["causes"]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_further_causes_that_could_hide_beside_those_named_have_their_limits(
+    runs: tuple[Path, frozenset[str]],
+) -> None:
+    content = json.loads((runs[0] / "diagnosis.json").read_text())
+    limits = {limit["id"]: limit["parameters"] for limit in content["limits"]}
+    assert not runs[1] & limits.keys()
+    assert {"length_offset", "force_drift"} <= limits.keys()
+    assert all(band["q05"] < band["q95"] for bands in limits.values() for band in bands.values())
+    further = [set(a["ids"]) for a in content["alternatives"] if set(a["ids"]) > runs[1]]
+    assert len(further) >= 5
+    page = (runs[0] / "report.html").read_text()
+    assert "Beside the causes named nothing was found" in page
 
 
 def test_the_same_again_is_kept(runs: tuple[Path, frozenset[str]]) -> None:

@@ -15,7 +15,8 @@ from rig.effects import form as rig_form
 from scipy import integrate, linalg
 
 from mpam_calib.criticism.candidates import candidates
-from mpam_calib.criticism.fit import chain_for
+from mpam_calib.criticism.doubt import DOUBTS
+from mpam_calib.criticism.fit import chain_for, fit
 from mpam_calib.criticism.limits import hidden_sizes
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.effect import effect
@@ -25,6 +26,9 @@ from mpam_calib.units import si_factor
 from .test_hypotheses import problem_of, specimen_of
 
 Array = NDArray[np.float64]
+
+NOTHING: frozenset[str] = frozenset()
+DRIFT = frozenset(["force_drift"])
 
 WITHOUT_FRICTION = "develop-null-006"
 """Tensile moduli with one factor, no friction: but for the effect's size the force is linear."""
@@ -38,16 +42,27 @@ def problem() -> Problem:
     return found
 
 
-def log_likelihood(problem: Problem, identifier: str, x: Array) -> Array:
-    """Of sizes (k,), the moduli's factor integrated out in closed form: normal, by dense algebra."""
-    chain = chain_for(problem.blueprint.model_dump_json(), frozenset([identifier]))
+def log_likelihood(problem: Problem, identifier: str, x: Array, beside: frozenset[str] = NOTHING) -> Array:
+    """Of sizes (k,), the moduli's factor integrated out in closed form: normal, by dense algebra.
+
+    So is the size of an effect ``beside``, in which the force is linear.
+    """
+    chain = chain_for(problem.blueprint.model_dump_json(), beside | {identifier})
     readings, first, second = problem.lean
-    (name,) = (p.name for p in chain.parameters)
+    (own,) = effect(identifier).parameters(problem.model.setting)
+    others = [p for p in chain.parameters if p.name != own.name]
     found = []
     for size in x:
-        terms = chain.terms({name: np.full((1, 1), size)}, readings)
-        fixed = 0.5 * (terms.fixed[0, first] + terms.fixed[0, second]) + problem.bow
-        columns = 0.5 * (terms.columns[0, first] + terms.columns[0, second])
+
+        def on_rows(u: float, size: float = size) -> tuple[Array, Array]:
+            values = {p.name: p.prior.from_normal(np.full((1, 1), u)) for p in others}
+            terms = chain.terms(values | {own.name: np.full((1, 1), size)}, readings)
+            return tuple(0.5 * (t[0, first] + t[0, second]) for t in (terms.fixed, terms.columns))
+
+        fixed, columns = on_rows(0.0)
+        if others:
+            columns = np.column_stack([columns, (on_rows(1e-3)[0] - fixed) / 1e-3])
+        fixed = fixed + problem.bow
         factor = linalg.cholesky(problem.covariance(0.0) + columns @ columns.T, lower=True)
         white = linalg.solve_triangular(factor, problem.force - fixed, lower=True)
         found.append(-0.5 * white @ white - np.sum(np.log(np.diagonal(factor))))
@@ -58,7 +73,7 @@ def log_likelihood(problem: Problem, identifier: str, x: Array) -> Array:
 def test_the_band_is_that_of_the_known_posterior(problem: Problem, identifier: str) -> None:
     """Of either sign, and of one: there the density falls off a cliff at nothing."""
     kinds = (f"{identifier}:{kind}" for kind in effect(identifier).kinds)
-    low, high = hidden_sizes(problem, [identifier])[identifier]
+    low, high = hidden_sizes(problem, [identifier], fit(problem, NOTHING, 0))[identifier]
     width = high - low
     bands = []
     for form in (identifier, *kinds):
@@ -80,10 +95,55 @@ def test_nothing_is_inside_where_nothing_is_hidden() -> None:
     inside = []
     for name in [r.name for r in sets.recipes("develop") if r.group == "null"][:4]:
         found = problem_of(specimen_of(name))
-        bands = hidden_sizes(found, candidates(found).tested).values()
+        bands = hidden_sizes(found, candidates(found).tested, fit(found, NOTHING, 0)).values()
         inside += [low < 0.0 < high for low, high in bands if low < 0.0 or high < 0.0]
     assert len(inside) >= 30
     assert np.mean(inside) >= 0.85
+
+
+PAIRS = {
+    "develop-separable-016": "dead_band",
+    "develop-separable-019": "force_drift",
+    "develop-separable-037": "force_drift",
+}
+"""Cases of two causes, both of shared forms, and the one of these that may have either sign."""
+
+
+def truth_of(name: str) -> tuple[str, ...]:
+    return recipes.build_case(next(r for r in sets.recipes("develop") if r.name == name)).ids
+
+
+def test_beside_causes_that_are_named_nothing_further_is_seen_but_what_is_there() -> None:
+    """Beside both hidden causes no band says that there is more; beside one of them the other's does."""
+    inside = []
+    for name, signed in PAIRS.items():
+        found = problem_of(specimen_of(name))
+        tested, truth = candidates(found).tested, frozenset(truth_of(name))
+        both = hidden_sizes(found, tested, fit(found, truth, 0, doubts=DOUBTS))
+        assert not truth & both.keys()
+        inside += [low < 0.0 < high for low, high in both.values() if low < 0.0 or high < 0.0]
+        one = hidden_sizes(found, tested, fit(found, truth - {signed}, 0, doubts=DOUBTS))
+        low, high = one[signed]
+        assert low > 0.0 or high < 0.0, (name, signed)
+    assert len(inside) >= 20
+    assert np.mean(inside) >= 0.85
+
+
+@pytest.mark.parametrize("identifier", ["length_offset", "braid_stretch"])
+def test_the_band_beside_a_named_cause_is_that_of_the_known_posterior(
+    problem: Problem, identifier: str
+) -> None:
+    """The named one, a drift, is integrated out by dense algebra: the force is linear in it."""
+    low, high = hidden_sizes(problem, [identifier], fit(problem, DRIFT, 0))[identifier]
+    (parameter,) = effect(identifier).parameters(problem.model.setting)
+    ends = np.array([low - (high - low), high + (high - low)])
+    u = np.linspace(*parameter.prior.to_normal(ends), 200)
+    x = parameter.prior.from_normal(u)
+    log_density = log_likelihood(problem, identifier, x, beside=DRIFT) - 0.5 * u**2
+    density = np.exp(log_density - log_density.max())
+    mass = integrate.cumulative_trapezoid(density, u, initial=0)
+    expected = np.interp([0.05, 0.95], mass / mass[-1], x)
+    assert (low, high) == pytest.approx(tuple(expected), abs=0.03 * (expected[1] - expected[0]))
 
 
 @pytest.mark.long
@@ -103,7 +163,7 @@ def test_small_sizes_of_another_rig_are_inside(share: float, least: int) -> None
             small = replace(one, hidden=(replace(hidden, size=share * hidden.size),))
             rig_case.write_case(small, Path(folder) / "specimen", Path(folder) / "truth.json")
             found = problem_of(read(Path(folder) / "specimen"))
-        bands = hidden_sizes(found, [hidden.id])
+        bands = hidden_sizes(found, [hidden.id], fit(found, NOTHING, 0))
         if hidden.id in bands:
             low, high = np.array(bands[hidden.id]) / si_factor(form.parameter)
             inside.append(low <= share * hidden.size <= high)
