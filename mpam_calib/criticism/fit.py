@@ -71,11 +71,12 @@ def doubt_columns(
     return doubts(chain_for(key, effects), without, values, eta, readings, guide)
 
 
-def doubt_on_rows(climb: Climb, place: Place, key: str, effects: frozenset[str]) -> Array:
-    """The same columns on a problem's rows (n, r), with sizes and force as a climb has them at a place."""
-    readings, first, second = climb.problem.lean
-    eta = place.eta[: climb.chain.linear_size]
-    columns = doubt_columns(key, effects, climb.values(place.u[None]), eta, readings, place.guide)
+def doubt_on_rows(
+    problem: Problem, key: str, effects: frozenset[str], values: dict[str, Array], eta: Array, guide: Array
+) -> Array:
+    """The same columns on a problem's rows (n, r); ``guide`` (m,) is the force at its lean readings."""
+    readings, first, second = problem.lean
+    columns = doubt_columns(key, effects, values, eta, readings, guide)
     return 0.5 * (columns[first] + columns[second])
 
 
@@ -102,7 +103,7 @@ def fit(
     if not effects or not doubts:
         return plain
     # A doubt is in proportion to the sizes found so far; with it they settle once more.
-    columns = doubt_on_rows(climb, place, key, effects)
+    columns = doubt_on_rows(problem, key, effects, climb.values(place.u[None]), place.eta, place.guide)
     found = []
     for doubt in doubts:
         if doubt == 0.0:

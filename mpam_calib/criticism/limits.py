@@ -73,21 +73,15 @@ def _beside(problem: Problem, named: Fit, doubt: Array, further: frozenset[str] 
     return Climb(problem, chain, 0, doubt)
 
 
-def _mode(climb: Climb, named: Fit) -> Place:
-    """Where the climb ends that begins where the causes named ended."""
-    start = ended(named)
-    u = np.array([start.get(name, 0.0) for name in climb.names], dtype=np.float64)
-    return climb.climb(u, climb.guide(), np.zeros(climb.chain.linear_size))
-
-
 def _doubt(problem: Problem, named: Fit) -> Array:
     """What the forms of the causes named may get wrong: columns (n, r), N, with coefficients N(0, 1)."""
     none = np.empty((len(problem), 0))
     if named.doubt_sd == 0.0:
         return none
-    climb = _beside(problem, named, none)
-    key = problem.blueprint.model_dump_json()
-    return named.doubt_sd * doubt_on_rows(climb, _mode(climb, named), key, named.effects)
+    climb, key = _beside(problem, named, none), problem.blueprint.model_dump_json()
+    values = climb.values(named.u[None])
+    guide = climb.chain.force(values, named.eta[None], problem.lean[0])[0]
+    return named.doubt_sd * doubt_on_rows(problem, key, named.effects, values, named.eta, guide)
 
 
 def _band(task: tuple[Fit, Array, str]) -> tuple[float, Band] | None:
@@ -97,9 +91,11 @@ def _band(task: tuple[Fit, Array, str]) -> tuple[float, Band] | None:
     setting = climb.problem.model.setting
     assert setting is not None
     (own,) = effect(form).parameters(setting)
+    start = ended(named)
+    u = np.array([start.get(name, 0.0) for name in climb.names], dtype=np.float64)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # of shapes that no muscle has
-            mode = _mode(climb, named)
+            mode = climb.climb(u, climb.guide(), np.zeros(climb.chain.linear_size))
             points, found = _walk(climb, mode, climb.names.index(own.name))
     except (np.linalg.LinAlgError, ValueError):  # scipy's word for slopes that are not finite
         return None

@@ -260,6 +260,19 @@ def _limits(content: dict[str, Any], parameters: dict[str, Parameter]) -> list[B
         "size inside its 90 % band and these data would look the same. Where such a size would "
         "matter to you, make the measurement beside it."
     )
+    # Of a size with one sign no band holds nothing.
+    signed = {n for n, p in parameters.items() if p.prior.from_normal(np.array([-1.0]))[0] < 0.0}
+    seen = [
+        effect(limit["id"]).title.lower()
+        for limit in content["limits"]
+        for name, band in limit["parameters"].items()
+        if name in signed and not band["q05"] < 0.0 < band["q95"]
+    ]
+    if seen:
+        text += (
+            f" Bands that exclude zero, though that is too little for a name: {', '.join(seen)}. Look at "
+            "these first; one in ten does so by chance."
+        )
     rows = [
         {
             "effect": effect(limit["id"]).title,

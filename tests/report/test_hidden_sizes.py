@@ -1,0 +1,40 @@
+"""What the page says of sizes that could hide: which bands exclude zero, where a band can hold it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from criticism.test_hypotheses import problem_of, specimen_of
+
+from mpam_calib.model.effect import effect
+from mpam_calib.model.priors import Parameter
+from mpam_calib.report.diagnosis import _limits
+from mpam_calib.report.page import Text
+
+IDS = ("length_offset", "rig_compliance")
+"""One of either sign, and one that is never below zero."""
+
+
+@pytest.fixture(scope="module")
+def parameters() -> dict[str, Parameter]:
+    setting = problem_of(specimen_of("develop-null-006")).model.setting
+    return {p.name: p for e in IDS for p in effect(e).parameters(setting)}
+
+
+@pytest.mark.parametrize(("low", "named"), [(0.1, True), (-0.1, False)])
+def test_a_band_of_either_sign_that_excludes_zero_is_pointed_out(
+    parameters: dict[str, Parameter], low: float, named: bool
+) -> None:
+    offset, compliance = parameters
+    content: dict[str, Any] = {
+        "causes": [],
+        "limits": [
+            {"id": "length_offset", "parameters": {offset: {"q05": low, "q95": 0.3}}},
+            {"id": "rig_compliance", "parameters": {compliance: {"q05": 1e-6, "q95": 1e-4}}},
+        ],
+    }
+    text = _limits(content, parameters)[0]
+    assert isinstance(text, Text)
+    assert ("length offset" in text.html) == named
+    assert "compliance" not in text.html
