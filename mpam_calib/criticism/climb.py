@@ -141,7 +141,9 @@ class Climb:
         # Given the sizes, the linear coordinates' optimum is exact.
         best = _solve(X.T @ X + np.eye(X.shape[1]), X.T @ white[:, 0])
         residual = white[:, 0] - X @ best
-        force = guide + (fixed + slope * (columns @ best[:p]) - guide) * factor
+        force = fixed + slope * (columns @ best[:p])
+        if self.chain.uses_force:
+            force = guide + (force - guide) * factor
         force = np.broadcast_to(force, (len(points), len(readings)))[: len(u) + 1]
         whole = rows(force) + problem.bow
         objective = -0.5 * float(residual @ residual + u @ u + best @ best)

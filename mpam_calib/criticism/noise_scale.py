@@ -55,11 +55,12 @@ def noise_scale(problem: Problem, fits: Sequence[Fit]) -> float:
     At their modes: ln p(y | s) = ln N(residual; 0, s² noise + remainder) + k ln s, where k is the number of
     parameters that the data settle, whose widths go with s.
     """
-    axes, powers, _ = problem.axes
+    axes = problem.axes
     terms = []
     for f in fits:
         residual = axes @ (problem.force - f.force - f.doubt)
-        variance = np.exp(2.0 * LOG_SCALES)[:, None] + (SIZES[f.size] * problem.force_scale) ** 2 * powers
+        remainder = (SIZES[f.size] * problem.force_scale) ** 2 * axes.powers
+        variance = np.exp(2.0 * LOG_SCALES)[:, None] + remainder
         settled = len(f.covariance) - float(np.trace(f.covariance))
         change = -0.5 * np.sum(residual**2 / variance + np.log(variance), axis=1) + settled * LOG_SCALES
         change -= change[len(LOG_SCALES) // 2]

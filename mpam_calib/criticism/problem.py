@@ -19,7 +19,7 @@ from scipy import linalg
 from mpam_calib.criticism.noise_level import NoiseLevel, noise_level
 from mpam_calib.criticism.rows import Rows, telling_points, telling_strokes
 from mpam_calib.criticism.saturation import along_a_ceiling, saturated
-from mpam_calib.criticism.whitening import Whitening
+from mpam_calib.criticism.whitening import Axes, Whitening
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.noise import grown
@@ -185,14 +185,9 @@ class Problem:
 
         ``noise_level``, which is that of single readings, stays.
         """
-        axes, powers, log_det = self.axes
         made = replace(self, noise=scale**2 * self.noise, tied=scale * self.tied)
         made.__dict__.update({name: getattr(self, name) for name in ("model", "lean", "bow")})
-        made.__dict__["axes"] = (
-            axes / scale,
-            powers / scale**2,
-            log_det + 2.0 * len(self) * float(np.log(scale)),
-        )
+        made.__dict__["axes"] = self.axes.scaled(scale)
         return made
 
     def covariance(self, size: float) -> Array:
@@ -206,7 +201,7 @@ class Problem:
         """
         if size == 0:
             return self.root @ columns
-        turned = self.axes[0] @ columns
+        turned = self.axes @ columns
         return np.asarray(turned / self.spreads[size].reshape(-1, *[1] * (columns.ndim - 1)))
 
     @cached_property
@@ -215,29 +210,23 @@ class Problem:
         return Whitening.build(self.noise, self.tied)
 
     @cached_property
-    def axes(self) -> tuple[Array, Array, float]:
-        """Axes (n, n) that whiten the noise and part the remainder, its powers (n,) along them, ln|noise|.
+    def axes(self) -> Axes:
+        """What whitens the noise and parts the remainder, whose size need not be known for it.
 
-        For every size of the remainder the covariance is diagonal on them: 1 + (size·force scale)²·power.
+        For every size the covariance is diagonal on these axes: 1 + (size·force scale)²·power.
         """
-        root = np.asarray(linalg.cholesky(self.noise, lower=True))
-        half = linalg.solve_triangular(root, self.kernel, lower=True)
-        whitened = linalg.solve_triangular(root, half.T, lower=True)
-        powers, turns = linalg.eigh(0.5 * (whitened + whitened.T))
-        axes = linalg.solve_triangular(root, turns, lower=True, trans="T").T
-        log_det = 2.0 * float(np.sum(np.log(np.diagonal(root))))
-        return np.ascontiguousarray(axes), np.maximum(powers, 0.0), log_det
+        return Axes.build(self.noise, self.kernel)
 
     @cached_property
     def spreads(self) -> list[Array]:
         """Standard deviations along the axes for each of SIZES."""
-        powers = self.axes[1]
+        powers = self.axes.powers
         return [np.sqrt(1.0 + (size * self.force_scale) ** 2 * powers) for size in SIZES]
 
     @cached_property
     def log_dets(self) -> list[float]:
         """ln|C| for each of SIZES."""
-        return [self.axes[2] + 2.0 * float(np.sum(np.log(spread))) for spread in self.spreads]
+        return [self.axes.log_det + 2.0 * float(np.sum(np.log(spread))) for spread in self.spreads]
 
 
 def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:

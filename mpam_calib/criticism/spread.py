@@ -34,7 +34,7 @@ def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
     Raises ``Interrupted`` where a worker is killed.
     """
     # What all need is there before anyone is forked.
-    assert len(problem.axes[1]) == len(problem.bow) == len(problem.spreads[0]) == len(problem.root)
+    assert len(problem.axes) == len(problem.bow) == len(problem.spreads[0]) == len(problem.root)
     assert problem.log_dets
     if workers == 1:
         before = _PROBLEM

@@ -1,4 +1,4 @@
-"""Whitening by strokes, and by what ties them together: as cheap as if they were apart."""
+"""Whitening, as cheap as what is tied together allows: strokes of the noise, branches of the remainder."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 SPARSE = 0.1
 """Share of a factor's entries below which it is worth leaving the others out."""
@@ -45,3 +46,52 @@ class Whitening:
         """W·columns, (n, ...)."""
         own = np.asarray(self.apart @ columns)
         return np.asarray(own - (self.axes * self.shrink) @ (self.axes.T @ own))
+
+
+@dataclass(frozen=True)
+class Axes:
+    """A matrix A (n, n) with A·C·Aᵀ = 1 and A·K·Aᵀ = diag(powers) for two covariances C and K.
+
+    ``blocks`` are the rows (m,), and the axes (m, m), of those that neither of them ties to others, such as
+    the two branches; ``log_det`` is ln|C|.
+    """
+
+    blocks: tuple[tuple[Ints, Array], ...]
+    powers: Array
+    log_det: float
+
+    @classmethod
+    def build(cls, covariance: Array, kernel: Array) -> Axes:
+        """From C and K (n, n); raises ``numpy.linalg.LinAlgError`` where C is no covariance."""
+        tied = sparse.csr_array((covariance != 0.0) | (kernel != 0.0))
+        count, label = sparse.csgraph.connected_components(tied, directed=False)
+        blocks, powers, log_det = [], np.empty(len(covariance)), 0.0
+        for rows in (np.flatnonzero(label == k) for k in range(count)):
+            own = np.ix_(rows, rows)
+            root = np.asarray(linalg.cholesky(covariance[own], lower=True))
+            half = linalg.solve_triangular(root, kernel[own], lower=True)
+            whitened = linalg.solve_triangular(root, half.T, lower=True)
+            found, turns = linalg.eigh(0.5 * (whitened + whitened.T))
+            axes = linalg.solve_triangular(root, turns, lower=True, trans="T").T
+            blocks.append((rows, np.ascontiguousarray(axes)))
+            powers[rows] = np.maximum(found, 0.0)
+            log_det += 2.0 * float(np.sum(np.log(np.diagonal(root))))
+        return cls(tuple(blocks), powers, log_det)
+
+    def __len__(self) -> int:
+        return len(self.powers)
+
+    def __matmul__(self, columns: Array) -> Array:
+        """A·columns, (n, ...)."""
+        if len(self.blocks) == 1:
+            return np.asarray(self.blocks[0][1] @ columns)
+        result = np.empty_like(columns)
+        for rows, axes in self.blocks:
+            result[rows] = axes @ columns[rows]
+        return result
+
+    def scaled(self, scale: float) -> Axes:
+        """The same for scale²·C."""
+        blocks = tuple((rows, axes / scale) for rows, axes in self.blocks)
+        log_det = self.log_det + 2.0 * len(self) * float(np.log(scale))
+        return Axes(blocks, self.powers / scale**2, log_det)

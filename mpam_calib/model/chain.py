@@ -209,6 +209,8 @@ class Chain:
         per_modulus = modulus_columns(shape, state.rest, simulation.strain, simulation.order)
         readings = state.readings
         mean, columns = self.moduli.columns(readings.pressure, readings.level, per_modulus, values)
+        if np.all(gain == 1.0):
+            return fixed + mean, columns
         return fixed + gain * mean, (gain + np.zeros(mean.shape))[..., None] * columns
 
     def _to_sensor(self, state: State, values: Values) -> State:

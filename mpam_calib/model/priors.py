@@ -6,6 +6,7 @@ The sampler walks in u, where every prior is the same and no parameter has a bou
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Protocol
 
 import numpy as np
@@ -95,9 +96,8 @@ class LongTailed:
 
     @property
     def sd(self) -> float:
-        """Standard deviation (by quadrature)."""
-        nodes, weights = np.polynomial.hermite_e.hermegauss(60)
-        return float(np.sqrt(weights @ self.from_normal(nodes) ** 2 / weights.sum()))
+        """Standard deviation."""
+        return self.scale * _long_tailed_sd()
 
     def describe(self, factor: float = 1.0) -> str:
         """One phrase."""
@@ -106,6 +106,13 @@ class LongTailed:
     def widened(self, factor: float) -> LongTailed:
         """Zero stays the middle."""
         return LongTailed(factor * self.scale)
+
+
+@cache
+def _long_tailed_sd() -> float:
+    """The sd for scale 1, by quadrature."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(60)
+    return float(np.sqrt(weights @ LongTailed(1.0).from_normal(nodes) ** 2 / weights.sum()))
 
 
 @dataclass(frozen=True)

@@ -41,14 +41,20 @@ def sin_braid_angle(L: Array, rest: Rest) -> Array:
 
 def tan2_braid_angle(L: Array, rest: Rest) -> Array:
     """T = tan²α at length L (m), from Eq. 4.15."""
-    s2 = sin_braid_angle(L, rest) ** 2
-    return s2 / (1.0 - s2)
+    return _tan2(sin_braid_angle(L, rest) ** 2)
+
+
+def _tan2(sin2: Array) -> Array:
+    return sin2 / (1.0 - sin2)
 
 
 def radius_inextensible_braid(L: Array, rest: Rest) -> Array:
     """Outer radius (m) with strands of constant length: R = R0 cos α / cos α0 (thesis Eq. 2.10, 2.37)."""
-    cos = np.sqrt(1.0 - sin_braid_angle(L, rest) ** 2)
-    return rest.R0 * cos / np.cos(rest.alpha0)
+    return _radius_of_the_braid(sin_braid_angle(L, rest) ** 2, rest)
+
+
+def _radius_of_the_braid(sin2: Array, rest: Rest) -> Array:
+    return rest.R0 * np.sqrt(1.0 - sin2) / np.cos(rest.alpha0)
 
 
 def wall_at_constant_volume(L: Array, R: Array, rest: Rest) -> Array:
@@ -69,8 +75,9 @@ def radius_constant_thickness(L: Array, rest: Rest) -> Array:
 
 def shape_inextensible_braid(L: Array, rest: Rest) -> Shape:
     """R from Eq. 2.10, t from the constant wall volume (Eq. 2.6), T from Eq. 4.15."""
-    R = radius_inextensible_braid(L, rest)
-    return Shape(L, R, wall_at_constant_volume(L, R, rest), tan2_braid_angle(L, rest))
+    sin2 = sin_braid_angle(L, rest) ** 2
+    R = _radius_of_the_braid(sin2, rest)
+    return Shape(L, R, wall_at_constant_volume(L, R, rest), _tan2(sin2))
 
 
 def shape_constant_thickness(L: Array, rest: Rest) -> Shape:
@@ -113,8 +120,9 @@ def tip_shortened_length(L: Array, R: Array, rest: Rest, factor: Array) -> Array
 
 def shape_braid_of_constant_thickness(L: Array, rest: Rest) -> Shape:
     """R from Eq. 2.10, t = t0, T from Eq. 4.15: a wall that keeps its thickness within the strands."""
-    R = radius_inextensible_braid(L, rest)
-    return Shape(L, R, rest.t0 + np.zeros_like(R), tan2_braid_angle(L, rest))
+    sin2 = sin_braid_angle(L, rest) ** 2
+    R = _radius_of_the_braid(sin2, rest)
+    return Shape(L, R, rest.t0 + np.zeros_like(R), _tan2(sin2))
 
 
 SHAPES = {
