@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.errors import Interrupted
-from mpam_calib.posterior.pool import settle_worker
+from mpam_calib.posterior.pool import settle_worker, start_method
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -29,11 +29,11 @@ class Spread(Protocol):
 
 @contextmanager
 def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
-    """Forked workers that hold the problem; with one worker everything stays in this process.
+    """Worker processes that hold the problem; with one worker everything stays in this process.
 
     Raises ``Interrupted`` where a worker is killed.
     """
-    # What all need is there before anyone is forked.
+    # What all need is there before they begin.
     assert len(problem.axes) == len(problem.bow) == len(problem.spreads[0]) == len(problem.root)
     assert problem.log_dets
     if workers == 1:
@@ -46,7 +46,7 @@ def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
         return
     try:
         with ProcessPoolExecutor(
-            workers, mp_context=get_context("fork"), initializer=_begin, initargs=(problem,)
+            workers, mp_context=get_context(start_method()), initializer=_begin, initargs=(problem,)
         ) as pool:
             yield lambda function, tasks, chunk=1: pool.map(function, tasks, chunksize=chunk)
     except BrokenProcessPool as error:

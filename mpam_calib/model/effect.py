@@ -85,6 +85,10 @@ class Effect:
     sources: Mapping[str, str] = field(default_factory=dict)
     fault: bool = False
 
+    def __reduce__(self) -> tuple[Callable[[str], Effect], tuple[str]]:
+        """Another process looks the effect up: what it does need not be sendable."""
+        return effect, (self.id,)
+
     @property
     def bent_forms(self) -> tuple[str, ...]:
         """The forms that bend, one of every kind."""

@@ -39,8 +39,13 @@ def _adopt(target: Collapsed) -> None:
     settle_worker()
 
 
+def start_method() -> str:
+    """How processes begin: forked, or afresh where the system knows no fork."""
+    return "fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn"
+
+
 def settle_worker() -> None:
-    """Let a forked process work by itself, and die with its parent."""
+    """Let a worker process do its work by itself, and die with its parent."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)
         # A parent that was killed before this line will send nothing any more.
@@ -109,10 +114,9 @@ def workers(target: Collapsed, wanted: int) -> Iterator[Workers]:
         finally:
             _TARGET = before
         return
-    method = "fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn"
     count = max(1, min(wanted, os.cpu_count() or 1))
     others = set(multiprocessing.active_children())
-    context = multiprocessing.get_context(method)
+    context = multiprocessing.get_context(start_method())
     with ProcessPoolExecutor(count, mp_context=context, initializer=_adopt, initargs=(target,)) as executor:
         try:
             yield Processes(executor)

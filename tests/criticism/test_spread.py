@@ -10,7 +10,9 @@ from rig import sets
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.spread import held_problem, spread_over
+from mpam_calib.criticism import spread as module
+from mpam_calib.criticism.refits import best_of
+from mpam_calib.criticism.spread import Alone, held_problem, spread_over
 from mpam_calib.errors import Interrupted
 
 
@@ -43,3 +45,17 @@ def test_a_killed_worker_ends_the_work() -> None:
         assert list(spread(rows_held, [1, 2, 3])) == [len(problem) * k for k in (1, 2, 3)]
     with pytest.raises(Interrupted, match="killed"), spread_over(problem, 2) as spread:
         list(spread(rows_held, [0, 1, 2]))
+
+
+def test_processes_that_begin_afresh_do_the_same_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no process can be forked, as on Windows, the problem and its model's effects are sent."""
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null")
+    problem = problem_of(specimen_of(recipe.name))
+    forms = ("creep:bent", "presliding")
+    tasks = [(size, [(forms, {})], False) for size in (0, 2)]
+    here = list(Alone(problem)(best_of, tasks))
+    monkeypatch.setattr(module, "start_method", lambda: "spawn")
+    with spread_over(problem, 2) as spread:
+        there = list(spread(best_of, tasks))
+    assert all(f is not None and f.effects == set(forms) for f in here)
+    assert [f.log_evidence for f in there if f] == pytest.approx([f.log_evidence for f in here if f])

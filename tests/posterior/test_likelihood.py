@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -244,6 +245,17 @@ def test_the_linear_part_is_drawn_from_its_exact_distribution(name):
     assert stats.kstest((white**2).sum(axis=1), stats.chi2(k).cdf).pvalue > 1e-3
     # Draws that are narrowed by 5 % do not pass as these.
     assert stats.kstest(0.95**2 * (white**2).sum(axis=1), stats.chi2(k).cdf).pvalue < 1e-6
+
+
+def test_a_target_can_be_sent_to_a_process_that_begins_afresh():
+    """Effects that cannot be sent themselves (bent ones, equations of other authors) are looked up there."""
+    effects = {"effects": ["creep:bent", "presliding", "force_drift:thermal"], **LINEAR}
+    made, blueprint = simulated(build.specimen(effects, APART), FULL)
+    target = build_target(made, blueprint)
+    u = 0.5 * np.random.default_rng(3).standard_normal((4, len(target.model.names)))
+    here = target.log_posterior(u)
+    assert np.all(np.isfinite(here))
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(target)).log_posterior(u), here)
 
 
 def test_parameters_without_support_have_no_density():
