@@ -28,6 +28,7 @@ from mpam_calib.criticism.search import search
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Options, draw_blueprint
+from mpam_calib.posterior.pool import settle_worker
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
 
@@ -101,7 +102,7 @@ def main(which: str, count: int, workers: int = 2) -> None:
     names = {row["name"] for row in done}
     chosen = [r for r in sets.recipes(which) if r.group == "separable" and not r.outside]
     chosen = sorted(chosen, key=lambda r: r.seed)[:count]
-    with path.open("a", newline="") as file, ProcessPoolExecutor(workers) as pool:
+    with path.open("a", newline="") as file, ProcessPoolExecutor(workers, initializer=settle_worker) as pool:
         writer = csv.writer(file, lineterminator="\n")
         if not done:
             writer.writerow(FIELDS)

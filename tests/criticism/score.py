@@ -30,6 +30,7 @@ from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.effect import effect
+from mpam_calib.posterior.pool import settle_worker
 from mpam_calib.specimen import read
 from mpam_calib.units import si_factor
 
@@ -253,7 +254,7 @@ def main(which: str, shard: int = 0, shards: int = 1, workers: int = 2) -> None:
     if plain(which) != which:
         todo = [r for r in todo if r.effects and not r.outside]
     todo.sort(key=lambda r: r.seed)  # so that what an interrupted run has done is a fair sample
-    with path.open("a", newline="") as file, ProcessPoolExecutor(workers) as pool:
+    with path.open("a", newline="") as file, ProcessPoolExecutor(workers, initializer=settle_worker) as pool:
         writer = csv.writer(file, lineterminator="\n")
         if not done:
             writer.writerow(FIELDS)

@@ -12,6 +12,7 @@ import pytest
 from rig import sets
 
 from criticism.score import Scored, score_case
+from mpam_calib.posterior.pool import settle_worker
 
 STRIDES = {"null": 12, "separable": 9, "outside": 7}
 
@@ -23,7 +24,7 @@ def scored() -> dict[str, list[Scored]]:
         for group, stride in STRIDES.items()
         for recipe in [r for r in sets.recipes("develop") if r.group == group][::stride]
     ]
-    with ProcessPoolExecutor(2, mp_context=get_context("fork")) as pool:
+    with ProcessPoolExecutor(2, mp_context=get_context("fork"), initializer=settle_worker) as pool:
         found = list(pool.map(score_case, chosen))
     return {group: [case for case in found if case.group == group] for group in STRIDES}
 
