@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import pairwise
 from math import comb
 from typing import NamedTuple
@@ -31,6 +32,8 @@ PLACES, ZOOMS = 17, 4
 SHORTEST, SURE, IN_DOUBT = 1.0, 20.0, 5.0
 """Rows that a hold lasts at least, and twice the log likelihood by which it must fit better than none: to be
 believed, and to be thought of."""
+FINER = 2.0**0.5
+"""Ratio of the numbers of rows, tried one after the other, in which a crosshead gathers its speed."""
 LONG = 4
 """Times the rows of the motion beside it that a sure hold takes (a gentle turn takes about as many)."""
 TINY = 1e-12
@@ -200,24 +203,28 @@ def _turn(strokes: Floats, extreme: int, margin: float) -> Turn | None:
 
 
 class Rest(NamedTuple):
-    """Where (in rows) one stroke comes to rest and the next one leaves, at which value; residuals' rms."""
+    """Where (in rows) one stroke comes to rest and the next one leaves, at which value; residuals' rms.
+
+    ``ramp``: rows in which it slows down before and gathers speed after (infinite: all that are looked at).
+    """
 
     begin: float
     end: float
     at: float
     rms: float
+    ramp: float = 0.0
 
 
 def _rest(values: Floats, low: float, high: float) -> Rest:
     """Where, between the rows ``low`` and ``high``, one stroke comes to rest and where the next one leaves.
 
-    Least squares of x = x_turn + k·|row − begin|ᵖ before and k'·|row − end|ᵖ after, with p = 1 (full speed
-    into the turn and out of it) or 2 (gently). Both are one place, the turn, unless a hold between them fits
-    surely better.
+    Least squares of x = x_turn + k·way(begin − row) before and k'·way(row − end) after, at full speed into
+    the turn and out of it, gently or in between (:func:`_way`). Both are one place, the turn, unless a hold
+    between them fits surely better.
     """
     n = len(values)
-    met = _search(values, low, high, held=False)
-    held = _search(values, low, high, held=True)
+    met = _search(values, low, high, _ramps(n), held=False)
+    held = _search(values, low, high, {0.0, np.inf, met.ramp}, held=True)
     floor = TINY * float(np.ptp(values))
     better = n * np.log((met.rms**2 + floor**2) / (held.rms**2 + floor**2))
     if better > SURE and held.end - held.begin >= SHORTEST:
@@ -226,30 +233,44 @@ def _rest(values: Floats, low: float, high: float) -> Rest:
     return met._replace(at=held.at) if better > IN_DOUBT else met
 
 
-def _search(values: Floats, low: float, high: float, *, held: bool) -> Rest:
-    """The best fit of :func:`_rest` with or without a hold."""
+def _ramps(rows: int) -> list[float]:
+    """Rows in which a crosshead may gather its speed where so many are looked at."""
+    finite = FINER ** np.arange(1, 2.0 * np.log2(max(rows // 2, 1)) + 1.0)
+    return [0.0, *finite.tolist(), np.inf]
+
+
+def _way(rows: Floats, ramp: float) -> Floats:
+    """Way after so many rows (0 or more) at a pace that grows over ``ramp`` rows and is steady after them."""
+    if np.isinf(ramp):
+        return rows**2
+    early = np.minimum(rows, ramp)
+    return np.asarray(rows - early + early**2 / (2.0 * ramp)) if ramp else rows
+
+
+def _search(values: Floats, low: float, high: float, ramps: Iterable[float], *, held: bool) -> Rest:
+    """The best fit of :func:`_rest` with or without a hold, each ramp tried."""
     rows = np.arange(len(values), dtype=np.float64)
     span = max(len(values) - 1, 1)
     one, two = np.divmod(np.arange(PLACES**2), PLACES) if held else (np.arange(2 * PLACES),) * 2
     share = np.linspace(-0.5, 0.5, PLACES if held else 2 * PLACES)
     middle = 0.5 * (low + high)
     best = Rest(middle, middle, float(values[int(np.clip(middle, 0, len(values) - 1))]), np.inf)
-    for power in (1, 2):  # each on its own: on a coarse grid the wrong one may look better
+    for ramp in sorted(ramps):  # each on its own: on a coarse grid the wrong one may look better
         own, width = best._replace(begin=middle, end=middle, rms=np.inf), high - low
         for _ in range(ZOOMS):
             begin, end = np.clip(
                 np.stack([own.begin + width * share[one], own.end + width * share[two]]), low, high
             )
             end = np.maximum(begin, end)
-            before = np.maximum(begin[:, None] - rows, 0.0) / span
-            after = np.maximum(rows - end[:, None], 0.0) / span
-            X = np.stack([np.ones_like(before), before**power, after**power], axis=-1)
+            before = _way(np.maximum(begin[:, None] - rows, 0.0) / span, ramp / span)
+            after = _way(np.maximum(rows - end[:, None], 0.0) / span, ramp / span)
+            X = np.stack([np.ones_like(before), before, after], axis=-1)
             turned = np.swapaxes(X, 1, 2)
             k = np.linalg.solve(turned @ X + 1e-9 * np.eye(3), turned @ values[:, None])[..., 0]
             rms = np.sqrt(np.mean((values - np.einsum("brk,bk->br", X, k)) ** 2, axis=1))
             i = int(rms.argmin())
             if rms[i] < own.rms:
-                own = Rest(float(begin[i]), float(end[i]), float(k[i, 0]), float(rms[i]))
+                own = Rest(float(begin[i]), float(end[i]), float(k[i, 0]), float(rms[i]), ramp)
             width = 3.0 * width / PLACES
         if own.rms < best.rms:
             best = own
@@ -267,7 +288,8 @@ def _departure(stroke: Floats, margin: float) -> Turn:
     last = min(max(at_far + 1, at_near + SIDE), len(stroke) - 1)
     # Gently begun, the way to one margin takes 2.4 times as long as from there to two.
     first = max(at_near - 4 * (last - at_near), 0)
-    rest = _search(stroke[first : last + 1], 0.0, float(at_near + 1 - first), held=False)
+    beside = stroke[first : last + 1]
+    rest = _search(beside, 0.0, float(at_near + 1 - first), _ramps(len(beside)), held=False)
     return Turn(int(np.clip(np.floor(first + rest.begin) + 1, 0, at_near + 1)), rest.at, rest.rms, NEXT)
 
 

@@ -184,6 +184,33 @@ def test_rows_that_no_motion_tells_are_few_and_known(shape: str, hold: float, qu
     assert unclear / strokes < (0.6 if shape == "full speed" and not hold else 3.5)
 
 
+@pytest.mark.parametrize("fast", [1.0, 5.7])
+@pytest.mark.parametrize("ramp", [2.5, 4.4, 9.0])
+def test_a_crosshead_that_gathers_its_speed_in_a_few_rows_is_not_held(ramp: float, fast: float) -> None:
+    """Slow cycles, then faster ones, up to speed in as many rows; noise of a ten-thousandth of the stroke."""
+    rng = np.random.default_rng(6)
+    wrong, unclear, strokes = 0, 0, 0
+    for _ in range(10):
+        # Each stroke at its pace: speed v is reached after `ramp` rows and lost in as many.
+        paces = np.repeat([1.0, fast], 4) * 7.6 / 60.0
+        durations = 7.6 / paces + ramp
+        ends = np.concatenate([[0.0], np.cumsum(durations)])
+        t = np.arange(rng.uniform(), ends[-1])
+        number = np.searchsorted(ends, t, side="right") - 1
+        since, left = t - ends[number], ends[number + 1] - t
+        edge = np.minimum(np.minimum(since, left), ramp)
+        way = np.where(since < left, 0.0, 7.6) + np.where(since < left, 1.0, -1.0) * paces[number] * (
+            np.minimum(since, left) - edge + edge**2 / (2.0 * ramp)
+        )
+        x = np.where(number % 2 == 0, way, 7.6 - way) + 0.00076 * rng.standard_normal(len(t))
+        found = read_motion(x, turn_threshold(x), noise_sd(x))
+        wrong += np.count_nonzero((found.branch != np.where(number % 2 == 0, -1, 1)) & ~found.unclear)
+        unclear += np.count_nonzero(found.unclear)
+        strokes += len(paces)
+    assert wrong / strokes < 0.05
+    assert unclear / strokes < 3.5
+
+
 def trapezoid() -> tuple[np.ndarray, np.ndarray]:
     """Shares of a stroke's time and way that speeds up and slows down over an eighth of its time."""
     time = np.linspace(0.0, 1.0, 2001)
