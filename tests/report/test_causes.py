@@ -1,0 +1,54 @@
+"""What the page says of causes: when left-out readings speak against them, and sizes beside bends."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from criticism.test_hypotheses import problem_of, specimen_of
+
+from mpam_calib.model.effect import effect
+from mpam_calib.report.diagnosis import BENT, _causes, _unproven
+from mpam_calib.report.page import DataTable, Text
+
+HOLDS = {
+    "held_out": "cycle",
+    "rmse_before_N": 2.0,
+    "rmse_after_N": 1.0,
+    "elpd_gain": 80.0,
+    "coverage90_after": 0.9,
+}
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"rmse_after_N": 2.05}, "2.05 N with such causes and 2.00 N without"),
+        ({"elpd_gain": -3.0}, "less probable"),
+        ({"coverage90_after": 0.58}, "58 % of them"),
+    ],
+)
+def test_left_out_readings_that_speak_against_the_causes(changed: dict[str, Any], said: str) -> None:
+    (text,) = _unproven({"gain": HOLDS | changed})
+    assert said in text
+    assert "whole cycles" in text
+
+
+def test_left_out_readings_that_say_nothing_against_them() -> None:
+    assert _unproven({"gain": HOLDS}) == _unproven({"gain": None}) == []
+
+
+@pytest.mark.parametrize("form", ["", "bent"])
+def test_a_cause_states_its_probability_once_and_warns_of_bends(form: str) -> None:
+    setting = problem_of(specimen_of("develop-null-006")).model.setting
+    assert setting is not None
+    parameters = {p.name: p for p in effect(f"creep:{form}".strip(":")).parameters(setting)}
+    sizes = {name: {"mean": 0.1, "sd": 0.01, "q05": 0.08, "q95": 0.12} for name in parameters}
+    cause = {"id": "creep", "form": form, "probability": 0.98, "share_of_misfit": 0.7, "parameters": sizes}
+    text, table = _causes([cause], parameters)
+    assert isinstance(text, Text)
+    assert isinstance(table, DataTable)
+    assert (BENT in text.html) == (form == "bent")
+    assert len(table.rows) == len(parameters) > (form == "bent")
+    once = [(row[2], row[-1]) for row in table.rows]
+    assert once == [("0.98", "0.7"), *[("", "")] * (len(parameters) - 1)]
