@@ -85,7 +85,7 @@ class Axes:
         """A·columns, (n, ...)."""
         if len(self.blocks) == 1:
             return np.asarray(self.blocks[0][1] @ columns)
-        result = np.empty_like(columns)
+        result = np.empty(columns.shape)
         for rows, axes in self.blocks:
             result[rows] = axes @ columns[rows]
         return result
