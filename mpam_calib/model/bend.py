@@ -26,7 +26,10 @@ FORM: Final = "bent"
 """The form's name: ``id:bent``."""
 BENDS: Final = "_bend_"
 """What the names of its coefficients hold, beside those of the effect's own parameters."""
-BEND: Final[Mapping[str, float]] = {"contraction": 0.25, "pressure": 0.25, "force": 0.4, "speed": 0.4}
+BEND: Final[Mapping[str, float]] = {
+    **dict.fromkeys(("contraction", "pressure"), 0.25),
+    **dict.fromkeys(("force", "speed", "pace"), 0.4),
+}
 """Prior sd of the first bend: a size that differs by ±25 % between the two ends of its driver ..."""
 LOOSE: Final = 0.5
 """... and for the others, whose laws are the least known: how things fade with time, cycles and travel."""
@@ -45,9 +48,9 @@ def _pressure(state: State, setting: Setting) -> Array:
     return (2.0 * state.readings.pressure - low - high) / max(high - low, 1.0)
 
 
-def _speed(state: State, setting: Setting) -> Array:
-    speed = np.where(state.readings.speed > 0.0, state.readings.speed, setting.speed)
-    return np.asarray(np.log10(speed / setting.speed))
+def _decades(speed: Array, setting: Setting) -> Array:
+    """Decades from the test's mean speed; none at rest."""
+    return np.asarray(np.log10(np.where(speed > 0.0, speed, setting.speed) / setting.speed))
 
 
 def _travel(state: State, setting: Setting) -> Array:
@@ -69,7 +72,8 @@ DRIVERS: Final[Mapping[str, Callable[[State, Setting], Array]]] = {
     "cycle": lambda state, setting: 2.0 / state.readings.cycle - 1.0,
     "branch": lambda state, setting: state.readings.sign,
     "cycles": lambda state, setting: (state.readings.cycle - 1.0) / CYCLES - 1.0,
-    "speed": _speed,
+    "speed": lambda state, setting: _decades(state.readings.speed, setting),
+    "pace": lambda state, setting: _decades(state.readings.pace, setting),
     "travel": _travel,
 }
 """What a shape may bend with, in about −1..1 over the recordings: (n,) or (B, n)."""

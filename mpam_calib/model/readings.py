@@ -19,8 +19,8 @@ class Readings:
     ``time`` runs over the whole test, ``file_time`` on its file's own clock and ``time_at_level`` since the
     level was reached (s);
     ``cycle`` counts from 1 within a level and ``test_cycle`` over the whole test; ``travel`` is the
-    distance since the last reversal (m) and ``reversal`` 0 on a stroke that no reversal began; ``speed`` in
-    m/s (0: at rest).
+    distance since the last reversal (m) and ``reversal`` 0 on a stroke that no reversal began; ``speed``
+    (m/s, 0: at rest) is the crosshead's at the reading, ``pace`` that of its whole stroke.
     """
 
     pressure: Array
@@ -35,6 +35,7 @@ class Readings:
     travel: Array
     reversal: Array
     speed: Array
+    pace: Array
 
     def __len__(self) -> int:
         return len(self.pressure)
@@ -81,6 +82,7 @@ class Readings:
             travel=zero + FAR,
             reversal=zero,
             speed=zero,
+            pace=zero,
         )
 
 

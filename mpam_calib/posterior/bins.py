@@ -164,6 +164,7 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
         "time_at_level": mean(at_level),
         "cycle": loops.cycle[starts].astype(np.float64),
         "test_cycle": rows.test_cycle[starts],
+        "pace": rows.pace[starts],
         "reversal": reversal[starts],
         "speed": np.exp(moving_mean(np.log(np.maximum(speed, 1e-12)))),
     }

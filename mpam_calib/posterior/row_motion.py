@@ -24,6 +24,7 @@ def row_readings(loops: Loops) -> Readings:
     first, lengths = loops.strokes
     segment = np.repeat(np.arange(len(first)), lengths)
     travel, reversal, at_level = history(loops, first, lengths)
+    speed, rest = speeds(loops, first, first + lengths - 1, segment)
     return Readings(
         pressure=loops.pressure_Pa,
         displacement=loops.displacement_m,
@@ -36,7 +37,8 @@ def row_readings(loops: Loops) -> Readings:
         test_cycle=test_cycles(loops),
         travel=travel,
         reversal=reversal[segment],
-        speed=speeds(loops, first, first + lengths - 1, segment)[0],
+        speed=speed,
+        pace=paces(speed, rest, segment)[segment],
     )
 
 
@@ -158,6 +160,18 @@ def speeds(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array,
     moving = np.maximum(np.add.reduceat((~rest).astype(np.float64), first), 1.0)
     typical = np.add.reduceat(np.where(rest, 0.0, local), first) / moving
     return np.where(rest, typical[segment], local), rest
+
+
+def paces(speed: Array, rest: NDArray[np.bool_], segment: Ints) -> Array:
+    """A stroke's own speed (strokes,), m/s: the median over its rows under way, over all where none is."""
+    still = np.bincount(segment, ~rest) == 0
+    counted = ~rest | still[segment]
+    speed, segment = speed[counted], segment[counted]
+    order = np.lexsort((speed, segment))
+    count = np.bincount(segment)
+    first = np.cumsum(count) - count
+    ordered = speed[order]
+    return np.asarray(0.5 * (ordered[first + (count - 1) // 2] + ordered[first + count // 2]))
 
 
 def _within(loops: Loops, window: Ints, start: Ints, stop: Ints) -> Array:

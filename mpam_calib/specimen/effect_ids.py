@@ -38,7 +38,10 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "length_offset": ("bent", "scale", "slip", "settling", "seating", "rezeroed"),
     "strand_friction": ("bent", "power", "contact"),
     "coulomb_friction": ("bent", "constant", "capstan"),
-    "rate_friction": ("bent", "viscous", "viscous-bent", "power", "drag"),
+    "rate_friction": (
+        *("bent", "viscous", "viscous-bent", "power", "drag"),
+        *("stroke", "stroke-power", "stroke-drag"),
+    ),
     "presliding": (
         *("bent", "rest", "sliding", "ramp", "rest-bent", "sliding-bent", "ramp-bent"),
         *("dahl", "rest-dahl", "sliding-dahl"),

@@ -26,7 +26,7 @@ DURATION, LEVEL_TIME, SPEED = 300.0, 60.0, 1e-3
 MODULI = np.array([6e4, 2e4])
 AWAY = {
     # Friction is as declared at the mean speed, and a law as declared in the middle.
-    "rate_friction": {"speed": 4.0 * SPEED},
+    "rate_friction": {"speed": 4.0 * SPEED, "pace": 4.0 * SPEED},
     "law_shape": {"pressure": 1e3 * LEVELS[-1]},
 }
 
@@ -74,6 +74,7 @@ def rows(setting: Setting, count: int = 60) -> Readings:
         travel=1e-6 + rng.permutation(share) * setting.stroke,
         reversal=np.where(share > 0.2, 1.0, 0.0),
         speed=SPEED * 10.0 ** (2.0 * rng.permutation(share) - 1.0),
+        pace=SPEED * 10.0 ** (2.0 * rng.permutation(share) - 1.0),
     )
 
 
@@ -92,6 +93,7 @@ def middle(setting: Setting, **away: float) -> Readings:
         "travel": 0.02 * setting.stroke,
         "reversal": 1.0,
         "speed": SPEED,
+        "pace": SPEED,
     }
     return Readings(**{name: np.array([value]) for name, value in (values | away).items()})
 

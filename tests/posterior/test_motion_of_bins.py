@@ -115,6 +115,18 @@ def test_speed_follows_the_motion(rows):
     assert row_readings(made).speed[~at_rest] == pytest.approx(exact["speed"][~at_rest], abs=0.05 * top)
 
 
+@pytest.mark.parametrize("dwell", [0.0, 2.0, 30.0])
+def test_a_stroke_s_pace_is_one_and_the_same_to_its_ends(dwell):
+    """The median speed under way of a cosine, v sin 45°; a stroke driven twice as fast has twice of it."""
+    made, exact = gentle(60, dwell=dwell, strokes=4)
+    fast = made.stroke >= 2
+    made = replace(made, time_s=np.where(fast, 0.5 * (made.time_s + made.time_s[fast][0]), made.time_s))
+    pace = row_readings(made).pace
+    middle = exact["speed"].max() * np.sqrt(0.5)
+    assert pace == pytest.approx(np.where(fast, 2.0, 1.0) * middle, rel=0.03)
+    assert all(np.ptp(pace[made.stroke == s]) == 0.0 for s in range(4))
+
+
 @pytest.mark.parametrize("seed", [None, 3])
 def test_motion_and_dwell_share_no_bin(seed):
     """Three quarters of the rows are a dwell; the motion keeps its bins, and none is mixed."""

@@ -70,6 +70,13 @@ def _sliding_at_first(state: State, size: float) -> None:
     state.turn = state.turn * np.where(rows.travel <= rows.since_reversal * (1.0 + 1e-9), 1.0, turning)
 
 
+def _by_the_stroke(state: State, size: float) -> None:
+    """A power of the speed that the crosshead was set to, whatever it does at its turns."""
+    speed = state.rows.nominal_speed
+    v = speed / float(np.exp(np.mean(np.log(np.unique(speed)))))
+    state.rate = state.rate * (1.0 + size * (v**0.4 - 1.0) / (0.4 * np.log(10.0)))
+
+
 def _begun_before(state: State, size: float) -> None:
     """By a power of the time since the level was reached, 2.5 s before its first reading."""
     decades = ((1.0 + (state.rows.level_time + 2.5) / 0.8) ** 0.2 - 1.0) / (0.2 * np.log(10.0))
@@ -105,6 +112,8 @@ CONVENTIONS: dict[str, Form] = {
         _by("first_stretching", "stress_softening", _stiffer(_first_stretching)),
         # No reversal begins a level's first stroke: friction does not turn over on it.
         _by("sliding_at_first", "presliding", _sliding_at_first),
+        # Friction goes by the speed that the stroke was driven with, the gentle turns included.
+        _by("by_the_stroke", "rate_friction", _by_the_stroke),
         # A level is reached some time before its first reading.
         _by("begun_before", "creep", _begun_before),
         # The crosshead is zeroed anew at every level.

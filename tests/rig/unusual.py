@@ -77,6 +77,8 @@ def draw(seed: int, count: int, convention: str | None = None) -> Unusual | None
     habits = _habits(rng, ids)
     if convention == "tared":
         habits = replace(habits, a_file_each=True)
+    if convention == "by_the_stroke":
+        habits = replace(habits, motion="sine", dwell_s=3.0)
     blocked = float(static_force(muscle, np.array([max(levels)]), np.array([0.0]))[0])
     white = blocked * rng.choice([0.0015, 0.003, 0.004])
     protocol = Protocol(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.model.curves import level_stroke, power, signed_power
+from mpam_calib.model.curves import level_stroke, power, signed_power, stroke_pace
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import HalfLongTailed, LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -53,8 +53,7 @@ def _exponent(setting: Setting) -> tuple[Parameter, ...]:
 
 def _speed(state: State, values: Values, setting: Setting) -> State:
     """More of it the faster the stroke, by a power: 1 where the line's flow is laminar, 2 where it is not."""
-    speed = np.where(state.readings.speed > 0.0, state.readings.speed / setting.speed, 1.0)
-    part = power(speed, values["flow_exponent"]) * state.displacement / setting.stroke
+    part = power(stroke_pace(state, setting), values["flow_exponent"]) * state.displacement / setting.stroke
     return _drooped(state, values, part)
 
 
@@ -82,7 +81,7 @@ register(
             "speed": "line losses: Hagen-Poiseuille ∝ flow, turbulent or orifice ∝ flow²",
         },
         kinds={"level": "here full stroke is each level's own"},
-        bends={"contraction": 3, "speed": 1},
+        bends={"contraction": 3, "pace": 1},
         looseness=2.0,
     )
 )

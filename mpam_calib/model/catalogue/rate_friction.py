@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.model.curves import box_cox, signed_power
+from mpam_calib.model.curves import box_cox, signed_power, stroke_pace
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -30,7 +30,15 @@ def _speed(state: State, setting: Setting) -> Array:
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    decades = np.log10(_speed(state, setting))
+    return _gained(state, values, np.log10(_speed(state, setting)))
+
+
+def _stroke(state: State, values: Values, setting: Setting) -> State:
+    """By the stroke's own speed: what the crosshead does at the turns does not count."""
+    return _gained(state, values, np.log10(stroke_pace(state, setting)))
+
+
+def _gained(state: State, values: Values, decades: Array) -> State:
     gain = np.maximum(1.0 + values["rate_per_decade"] * decades, 0.0)
     return replace(state, friction_gain=state.friction_gain * gain)
 
@@ -57,9 +65,14 @@ def _at_scale(state: State, setting: Setting) -> Array:
 
 def _power(state: State, values: Values, setting: Setting) -> State:
     """A power of the speed: 0 is the logarithm, 1 a straight line, below 0 it levels off, as Stribeck's."""
-    growth = box_cox(_speed(state, setting), values["speed_exponent"]) / np.log(10.0)
-    gain = np.maximum(1.0 + values["rate_per_decade"] * growth, 0.0)
-    return replace(state, friction_gain=state.friction_gain * gain)
+    growth = box_cox(_speed(state, setting), values["speed_exponent"])
+    return _gained(state, values, growth / np.log(10.0))
+
+
+def _stroke_power(state: State, values: Values, setting: Setting) -> State:
+    """Such a power of the stroke's own speed."""
+    growth = box_cox(stroke_pace(state, setting), values["speed_exponent"])
+    return _gained(state, values, growth / np.log(10.0))
 
 
 def _speed_exponent(setting: Setting) -> tuple[Parameter, ...]:
@@ -68,9 +81,17 @@ def _speed_exponent(setting: Setting) -> tuple[Parameter, ...]:
 
 def _drag(state: State, values: Values, setting: Setting) -> State:
     """Beside the declared friction and the same at any force, as "viscous", but a power of the speed."""
-    speed = signed_power(_speed(state, setting), values["drag_exponent"])
-    added = values["rate_per_decade"] * _at_scale(state, setting) * speed / np.log(10.0)
-    return replace(state, drag=state.drag + added)
+    return _dragged(state, values, setting, _speed(state, setting))
+
+
+def _stroke_drag(state: State, values: Values, setting: Setting) -> State:
+    """Such a power of the stroke's own speed."""
+    return _dragged(state, values, setting, stroke_pace(state, setting))
+
+
+def _dragged(state: State, values: Values, setting: Setting, speed: Array) -> State:
+    growth = signed_power(speed, values["drag_exponent"]) / np.log(10.0)
+    return replace(state, drag=state.drag + values["rate_per_decade"] * _at_scale(state, setting) * growth)
 
 
 def _drag_exponent(setting: Setting) -> tuple[Parameter, ...]:
@@ -87,11 +108,26 @@ register(
         source="logarithmic in speed, relative to the geometric mean of the test's speeds",
         parameters=_parameters,
         apply=_apply,
-        forms={"viscous": _viscous, "power": _power, "drag": _drag},
-        own={"power": _speed_exponent, "drag": _drag_exponent},
+        forms={
+            "viscous": _viscous,
+            "power": _power,
+            "drag": _drag,
+            "stroke": _stroke,
+            "stroke-power": _stroke_power,
+            "stroke-drag": _stroke_drag,
+        },
+        own={
+            "power": _speed_exponent,
+            "drag": _drag_exponent,
+            "stroke-power": _speed_exponent,
+            "stroke-drag": _drag_exponent,
+        },
         sources={
             "power": "friction 1 + r(v^n − 1)/n: power law, viscous (n = 1), near Stribeck 1902 for n < 0",
             "drag": "Herschel & Bulkley 1926: beside dry friction a part ∝ v^n",
+            "stroke": "textbook: the same logarithm, of the stroke's own speed",
+            "stroke-power": "textbook: friction 1 + r(v^n − 1)/n with the stroke's own speed v",
+            "stroke-drag": "textbook: beside dry friction a part ∝ v^n, of the stroke's own speed v",
         },
         kinds={"viscous": "here by friction in proportion to the speed, the same at any force"},
         bends={"speed": 2},
