@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.curves import box_cox, settled
 from mpam_calib.model.effect import Effect, Parameters, Stage, Values, register
-from mpam_calib.model.priors import HalfLongTailed, LogNormal, Normal, Parameter
+from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "creep_per_decade",
-            HalfLongTailed(0.05),
+            LongTailed(0.05),
             "relaxation of the force for ten times the time",
             "",
             "1/decade",

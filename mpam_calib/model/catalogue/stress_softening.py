@@ -11,7 +11,7 @@ from scipy import special
 
 from mpam_calib.model.curves import level_stroke
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import HalfLongTailed, LogNormal, Parameter
+from mpam_calib.model.priors import LogNormal, LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ POWERS = ("power", "force-power", "test-power", "test-force-power")
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (
-        Parameter("first_cycle_fraction", HalfLongTailed(0.2), "how much stiffer the first cycle is", "", ""),
+        Parameter("first_cycle_fraction", LongTailed(0.2), "how much stiffer the first cycle is", "", ""),
     )
 
 
