@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from mpam_calib.model.curves import over_mean
 from mpam_calib.model.priors import Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
@@ -48,11 +49,6 @@ def _pressure(state: State, setting: Setting) -> Array:
     return (2.0 * state.readings.pressure - low - high) / max(high - low, 1.0)
 
 
-def _decades(speed: Array, setting: Setting) -> Array:
-    """Decades from the test's mean speed; none at rest."""
-    return np.asarray(np.log10(np.where(speed > 0.0, speed, setting.speed) / setting.speed))
-
-
 def _travel(state: State, setting: Setting) -> Array:
     travel = state.readings.travel / setting.stroke
     return np.asarray(2.0 * np.log1p(travel / TURN_SHARE) / np.log1p(1.0 / TURN_SHARE) - 1.0)
@@ -72,8 +68,8 @@ DRIVERS: Final[Mapping[str, Callable[[State, Setting], Array]]] = {
     "cycle": lambda state, setting: 2.0 / state.readings.cycle - 1.0,
     "branch": lambda state, setting: state.readings.sign,
     "cycles": lambda state, setting: (state.readings.cycle - 1.0) / CYCLES - 1.0,
-    "speed": lambda state, setting: _decades(state.readings.speed, setting),
-    "pace": lambda state, setting: _decades(state.readings.pace, setting),
+    "speed": lambda state, setting: np.log10(over_mean(state.readings.speed, setting)),
+    "pace": lambda state, setting: np.log10(over_mean(state.readings.pace, setting)),
     "travel": _travel,
 }
 """What a shape may bend with, in about −1..1 over the recordings: (n,) or (B, n)."""

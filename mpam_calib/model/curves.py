@@ -60,9 +60,9 @@ def level_stroke(state: State, setting: Setting) -> Array:
     return np.asarray(np.interp(state.readings.pressure, setting.levels, strokes))
 
 
-def stroke_pace(state: State, setting: Setting) -> Array:
-    """The stroke's own speed over the test's mean; 1 at rest."""
-    return np.where(state.readings.pace > 0.0, state.readings.pace / setting.speed, 1.0)
+def over_mean(speed: Array, setting: Setting) -> Array:
+    """A speed (m/s) over the test's mean; 1 at rest."""
+    return np.where(speed > 0.0, speed / setting.speed, 1.0)
 
 
 def half_test(setting: Setting) -> float:

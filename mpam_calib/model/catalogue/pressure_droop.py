@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.model.curves import level_stroke, power, signed_power, stroke_pace
+from mpam_calib.model.curves import level_stroke, over_mean, power, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import HalfLongTailed, LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -53,8 +53,8 @@ def _exponent(setting: Setting) -> tuple[Parameter, ...]:
 
 def _speed(state: State, values: Values, setting: Setting) -> State:
     """More of it the faster the stroke, by a power: 1 where the line's flow is laminar, 2 where it is not."""
-    part = power(stroke_pace(state, setting), values["flow_exponent"]) * state.displacement / setting.stroke
-    return _drooped(state, values, part)
+    growth = power(over_mean(state.readings.pace, setting), values["flow_exponent"])
+    return _drooped(state, values, growth * state.displacement / setting.stroke)
 
 
 def _flow_exponent(setting: Setting) -> tuple[Parameter, ...]:

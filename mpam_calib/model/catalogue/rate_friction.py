@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.model.curves import box_cox, signed_power, stroke_pace
+from mpam_calib.model.curves import box_cox, over_mean, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -24,18 +24,13 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     )
 
 
-def _speed(state: State, setting: Setting) -> Array:
-    """Speed over the test's mean; 1 at rest."""
-    return np.where(state.readings.speed > 0.0, state.readings.speed / setting.speed, 1.0)
-
-
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    return _gained(state, values, np.log10(_speed(state, setting)))
+    return _gained(state, values, np.log10(over_mean(state.readings.speed, setting)))
 
 
 def _stroke(state: State, values: Values, setting: Setting) -> State:
     """By the stroke's own speed: what the crosshead does at the turns does not count."""
-    return _gained(state, values, np.log10(stroke_pace(state, setting)))
+    return _gained(state, values, np.log10(over_mean(state.readings.pace, setting)))
 
 
 def _gained(state: State, values: Values, decades: Array) -> State:
@@ -48,7 +43,11 @@ def _viscous(state: State, values: Values, setting: Setting) -> State:
 
     The size is what the declared friction would grow by at the force scale, per decade at the mean speed.
     """
-    added = values["rate_per_decade"] * _at_scale(state, setting) * _speed(state, setting) / np.log(10.0)
+    return _dragged(state, values, setting, over_mean(state.readings.speed, setting))
+
+
+def _dragged(state: State, values: Values, setting: Setting, growth: Array) -> State:
+    added = values["rate_per_decade"] * _at_scale(state, setting) * growth / np.log(10.0)
     return replace(state, drag=state.drag + added)
 
 
@@ -65,13 +64,13 @@ def _at_scale(state: State, setting: Setting) -> Array:
 
 def _power(state: State, values: Values, setting: Setting) -> State:
     """A power of the speed: 0 is the logarithm, 1 a straight line, below 0 it levels off, as Stribeck's."""
-    growth = box_cox(_speed(state, setting), values["speed_exponent"])
+    growth = box_cox(over_mean(state.readings.speed, setting), values["speed_exponent"])
     return _gained(state, values, growth / np.log(10.0))
 
 
 def _stroke_power(state: State, values: Values, setting: Setting) -> State:
     """Such a power of the stroke's own speed."""
-    growth = box_cox(stroke_pace(state, setting), values["speed_exponent"])
+    growth = box_cox(over_mean(state.readings.pace, setting), values["speed_exponent"])
     return _gained(state, values, growth / np.log(10.0))
 
 
@@ -81,17 +80,14 @@ def _speed_exponent(setting: Setting) -> tuple[Parameter, ...]:
 
 def _drag(state: State, values: Values, setting: Setting) -> State:
     """Beside the declared friction and the same at any force, as "viscous", but a power of the speed."""
-    return _dragged(state, values, setting, _speed(state, setting))
+    speed = over_mean(state.readings.speed, setting)
+    return _dragged(state, values, setting, signed_power(speed, values["drag_exponent"]))
 
 
 def _stroke_drag(state: State, values: Values, setting: Setting) -> State:
     """Such a power of the stroke's own speed."""
-    return _dragged(state, values, setting, stroke_pace(state, setting))
-
-
-def _dragged(state: State, values: Values, setting: Setting, speed: Array) -> State:
-    growth = signed_power(speed, values["drag_exponent"]) / np.log(10.0)
-    return replace(state, drag=state.drag + values["rate_per_decade"] * _at_scale(state, setting) * growth)
+    pace = over_mean(state.readings.pace, setting)
+    return _dragged(state, values, setting, signed_power(pace, values["drag_exponent"]))
 
 
 def _drag_exponent(setting: Setting) -> tuple[Parameter, ...]:
