@@ -12,9 +12,9 @@ rival that must bend in all its parts is not to come close to causes that follow
 
 
 def flexible(identifier: str) -> tuple[str, ...]:
-    """The forms that hold most shapes of an effect, one of every kind."""
+    """The forms that hold most shapes of an effect: a bent one of every kind, and what no bend stands for."""
     item = effect(identifier)
-    return tuple(f"{identifier}:{form}" for form in (*item.bent_forms, *item.scattered)) or (identifier,)
+    return tuple(f"{identifier}:{form}" for form in (*item.bent_forms, *item.apart)) or (identifier,)
 
 
 def forms_of(identifier: str) -> tuple[str, ...]:

@@ -19,7 +19,8 @@ class Readings:
     ``time`` runs over the whole test, ``file_time`` on its file's own clock and ``time_at_level`` since the
     level was reached (s);
     ``cycle`` counts from 1 within a level and ``test_cycle`` over the whole test; ``travel`` is the
-    distance since the last reversal (m) and ``reversal`` 0 on a stroke that no reversal began; ``speed``
+    distance since the last reversal (m) and ``reversal`` 0 on a stroke that no reversal began; ``behind`` is
+    how far (m) the reading lies short of the longest contraction that the test had reached; ``speed``
     (m/s, 0: at rest) is the crosshead's at the reading, ``pace`` that of its whole stroke.
     """
 
@@ -34,6 +35,7 @@ class Readings:
     test_cycle: Array
     travel: Array
     reversal: Array
+    behind: Array
     speed: Array
     pace: Array
 
@@ -52,6 +54,7 @@ class Readings:
             low,
             displacement=0.5 * (low.displacement + high.displacement),
             travel=0.5 * (low.travel + high.travel),
+            behind=0.5 * (low.behind + high.behind),
         )
 
     @staticmethod
@@ -81,6 +84,7 @@ class Readings:
             test_cycle=zero + SETTLED,
             travel=zero + FAR,
             reversal=zero,
+            behind=zero + FAR,
             speed=zero,
             pace=zero,
         )
@@ -89,4 +93,4 @@ class Readings:
 SETTLED = 1e6
 """Cycle count that stands for "after many cycles"."""
 FAR = 1e3
-"""Distance (m) that stands for "far from the last reversal"."""
+"""Distance (m) that stands for "far from the last reversal", and from what was never stretched before."""

@@ -168,10 +168,14 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
         "reversal": reversal[starts],
         "speed": np.exp(moving_mean(np.log(np.maximum(speed, 1e-12)))),
     }
+    behind = mean(rows.behind)
+    # What is stretched for the first time is so at both points.
+    apart = np.where(behind < spread, 0.0, direction * spread)
     halves = [
         Readings(
             displacement=displacement + side * direction * spread,
             travel=np.maximum(bin_travel + side * spread, 0.0),
+            behind=np.maximum(behind - side * apart, 0.0),
             **common,
         )
         for side in (-1.0, 1.0)

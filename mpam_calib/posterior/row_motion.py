@@ -37,6 +37,7 @@ def row_readings(loops: Loops) -> Readings:
         test_cycle=test_cycles(loops),
         travel=travel,
         reversal=reversal[segment],
+        behind=np.maximum.accumulate(loops.displacement_m) - loops.displacement_m,
         speed=speed,
         pace=paces(speed, rest, segment)[segment],
     )

@@ -43,12 +43,13 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
         *("stroke", "stroke-power", "stroke-drag"),
     ),
     "presliding": (
-        *("bent", "rest", "sliding", "ramp", "rest-bent", "sliding-bent", "ramp-bent"),
-        *("dahl", "rest-dahl", "sliding-dahl"),
+        *("bent", "rest", "rest-bent", "masing", "masing-bent", "sliding", "sliding-bent"),
+        *("ramp", "ramp-bent", "dahl", "rest-dahl", "masing-dahl", "sliding-dahl"),
     ),
     "stress_softening": (
         *("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),
-        *("power", "force-power", "test-power", "test-force-power", "virgin"),
+        *("power", "force-power", "test-power", "test-force-power"),
+        *("virgin", "virgin-fading", "force-fading", "test-virgin"),
     ),
     "creep": (
         *("bent", "wall", "wall-bent", "early", "power", "solid"),

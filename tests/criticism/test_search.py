@@ -85,7 +85,7 @@ def test_forms_share_one_prior(identifier: str) -> None:
     shares = {form: np.exp(-price(form)) for form in forms_of(identifier)}
     assert sum(shares.values()) == pytest.approx(1.0)
     assert shares[identifier] >= 0.5
-    scattered = {f"{identifier}:{form}" for form in effect(identifier).scattered}
-    assert scattered <= set(flexible(identifier))
-    bent = sum(share for form, share in shares.items() if form in set(flexible(identifier)) - scattered)
+    apart = {f"{identifier}:{form}" for form in effect(identifier).apart}
+    assert apart <= set(flexible(identifier))
+    bent = sum(share for form, share in shares.items() if form in set(flexible(identifier)) - apart)
     assert bent == pytest.approx(0.1 if effect(identifier).forms else 1.0 / 6.0)

@@ -45,6 +45,7 @@ def rows(setting: Setting, count: int = 40) -> Readings:
         travel=share * setting.stroke,
         reversal=np.ones(count),
         speed=1e-3 * 10.0 ** (2.0 * share - 1.0),
+        behind=np.zeros(count),
         pace=np.full(count, 2e-3),
     )
 

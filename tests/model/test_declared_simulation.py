@@ -40,6 +40,7 @@ def readings_of(rows: Rows) -> Readings:
         travel=rows.since_reversal * 1e-3,
         reversal=np.ones(rows.count),
         speed=rows.speed * 1e-3,
+        behind=np.zeros(rows.count),
         pace=rows.speed * 1e-3,
     )
 

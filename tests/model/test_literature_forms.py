@@ -74,6 +74,7 @@ def rows(setting: Setting, count: int = 60) -> Readings:
         travel=1e-6 + rng.permutation(share) * setting.stroke,
         reversal=np.where(share > 0.2, 1.0, 0.0),
         speed=SPEED * 10.0 ** (2.0 * rng.permutation(share) - 1.0),
+        behind=rng.permutation(share) * setting.stroke,
         pace=SPEED * 10.0 ** (2.0 * rng.permutation(share) - 1.0),
     )
 
@@ -94,6 +95,7 @@ def middle(setting: Setting, **away: float) -> Readings:
         "reversal": 1.0,
         "speed": SPEED,
         "pace": SPEED,
+        "behind": 0.0,
     }
     return Readings(**{name: np.array([value]) for name, value in (values | away).items()})
 
@@ -121,7 +123,7 @@ def test_a_form_says_what_it_is_and_may_be_declared(form: str) -> None:
     assert item.source == base.sources[name]
     shared, all_names = ([p.name for p in i.parameters(setting)] for i in (base, item))
     own = base.own[name](setting) if name in base.own else ()
-    assert len(own) <= (len(setting.levels) if name in base.scattered else 2)
+    assert len(own) <= (len(setting.levels) if name in base.apart else 2)
     assert all_names == [*shared[: base.leading.get(name)], *(p.name for p in own)]
     assert all(p.meaning for p in item.parameters(setting))
     for parameter in own:

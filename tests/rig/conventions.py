@@ -60,6 +60,12 @@ def _first_stretching(rows: Rows) -> Array:
     return ((rows.cycle < 1.5) & (rows.direction < 0.0)).astype(float)
 
 
+def _beyond_the_longest(rows: Rows) -> Array:
+    """As new where nothing stretched it before; at the end of a stroke that did, less with every cycle."""
+    near = np.clip(1.0 - (rows.stroke - rows.displacement) / (0.25 * rows.stroke), 0.0, 1.0)
+    return np.where(_first_stretching(rows) > 0.0, 1.0, near * 0.5 ** (rows.cycle - 1.0))
+
+
 def _lagging(rows: Rows) -> Array:
     return rows.level_fraction * rows.nominal_speed / rows.nominal_speed.max()
 
@@ -68,6 +74,18 @@ def _sliding_at_first(state: State, size: float) -> None:
     rows = state.rows
     turning = 1.0 - 2.0 * np.exp(-rows.since_reversal / max(size, 1e-6))
     state.turn = state.turn * np.where(rows.travel <= rows.since_reversal * (1.0 + 1e-9), 1.0, turning)
+
+
+def _slipping_one_by_one(state: State, size: float) -> None:
+    """Four springs with sliders side by side, none of them under load when a level begins."""
+    rows = state.rows
+    first = rows.travel <= rows.since_reversal * (1.0 + 1e-9)
+    ways = size * np.array([[0.3], [0.8], [1.6], [3.0]])
+    loaded, turned = (
+        np.minimum(times * rows.since_reversal / np.maximum(ways, 1e-6), 1.0).mean(axis=0)
+        for times in (2.0, 1.0)
+    )
+    state.turn = state.turn * np.where(first, loaded, 2.0 * turned - 1.0)
 
 
 def _by_the_stroke(state: State, size: float) -> None:
@@ -110,8 +128,12 @@ CONVENTIONS: dict[str, Form] = {
         _by("softened_once", "stress_softening", _stiffer(lambda rows: 0.5 ** _cycles_before(rows))),
         # Only the first stretching is stiffer, not the way back.
         _by("first_stretching", "stress_softening", _stiffer(_first_stretching)),
+        # Rubber is as new beyond its longest stretch so far.
+        _by("beyond_the_longest", "stress_softening", _stiffer(_beyond_the_longest)),
         # No reversal begins a level's first stroke: friction does not turn over on it.
         _by("sliding_at_first", "presliding", _sliding_at_first),
+        # Friction builds up from none on a level's first stroke: Maxwell's slip.
+        _by("slipping_one_by_one", "presliding", _slipping_one_by_one),
         # Friction goes by the speed that the stroke was driven with, the gentle turns included.
         _by("by_the_stroke", "rate_friction", _by_the_stroke),
         # A level is reached some time before its first reading.

@@ -96,7 +96,7 @@ register(
         },
         own={"slip": _slip_time, "settling": _excess, "seating": _exponent, "rezeroed": _parts},
         recalls=("slip", "settling"),
-        scattered=("rezeroed",),
+        apart=("rezeroed",),
         sources={
             "scale": "textbook: gain error of a displacement sensor",
             "slip": "textbook: first-order settling of a clamp, 1 − exp(−t/τ)",

@@ -15,6 +15,8 @@ from mpam_calib.model.state import Setting, State
 Array = NDArray[np.float64]
 Apply = Callable[[State, Values, Setting], State]
 
+DAHL = ("dahl", "rest-dahl", "masing-dahl", "sliding-dahl")
+
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     prior = LogNormal(0.02 * setting.stroke, 1.0)
@@ -49,14 +51,19 @@ SAME, NONE_LEFT = 1e-6, 1e-15
 AGAINST, REST, SLIDING = 2.0, 1.0, 0.0
 """How far friction turns on a level's first stroke: from against it, since pressurising moved the muscle;
 from none; or not at all, since no reversal began the stroke."""
+MASING = 2.0
+"""How much quicker friction builds up from none than it turns over: Masing's rule."""
 
 
-def _turning(left: Callable[[State, Values], Array], first: float) -> Apply:
-    """Friction that turns over, on a level's ``first`` stroke by so much."""
+def _turning(left: Callable[[State, Values], Array], first: float, quicker: float = 1.0) -> Apply:
+    """Friction that turns over, on a level's ``first`` stroke by so much and so much ``quicker``."""
 
     def apply(state: State, values: Values, setting: Setting) -> State:
-        swing = first + (AGAINST - first) * state.readings.reversal
-        return replace(state, sign=state.sign * (1.0 - swing * left(state, values)))
+        reversal = state.readings.reversal
+        travel = state.readings.travel * (quicker + (1.0 - quicker) * reversal)
+        turned = replace(state, readings=replace(state.readings, travel=travel))
+        swing = first + (AGAINST - first) * reversal
+        return replace(state, sign=state.sign * (1.0 - swing * left(turned, values)))
 
     return apply
 
@@ -73,20 +80,23 @@ register(
         apply=_turning(_exponential, AGAINST),
         forms={
             "rest": _turning(_exponential, REST),
+            "masing": _turning(_exponential, REST, MASING),
             "sliding": _turning(_exponential, SLIDING),
             "ramp": _turning(_ramp, AGAINST),
             "dahl": _turning(_dahl, AGAINST),
             "rest-dahl": _turning(_dahl, REST),
+            "masing-dahl": _turning(_dahl, REST, MASING),
             "sliding-dahl": _turning(_dahl, SLIDING),
         },
         kinds={
             "rest": "here a level's first stroke starts from rest",
+            "masing": "here a level's first stroke starts from rest, in half the travel",
             "sliding": "here not on a level's first stroke",
             "ramp": "here in proportion to the travel",
         },
-        own=dict.fromkeys(("dahl", "rest-dahl", "sliding-dahl"), _exponent),
+        own=dict.fromkeys(DAHL, _exponent),
         sources=dict.fromkeys(
-            ("dahl", "rest-dahl", "sliding-dahl"),
+            DAHL,
             "Dahl 1976, exponent i after Bliman 1992; i = 1/2: Iwan 1966, Masing's rule with even slip",
         ),
         bends={"travel": 3},

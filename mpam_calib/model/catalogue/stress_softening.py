@@ -17,6 +17,7 @@ from mpam_calib.model.state import Setting, State
 Array = NDArray[np.float64]
 Apply = Callable[[State, Values, Setting], State]
 
+FADING = ("virgin-fading", "force-fading")
 POWERS = ("power", "force-power", "test-power", "test-force-power")
 
 
@@ -69,12 +70,31 @@ def _exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("cycle_exponent", LogNormal(0.8, 0.6), "power of the cycle count", "textbook", ""),)
 
 
-def _virgin(state: State, values: Values, setting: Setting) -> State:
-    """As new on a level's first stroke; from then on the softer, the farther from its longest."""
+def _level_way(state: State, setting: Setting) -> Array:
+    """Way (m) to the level's longest stroke; none on its first, which stretches the bladder anew."""
     new = (state.readings.cycle < 1.5) & (state.readings.sign < 0.0)
-    way = np.maximum(level_stroke(state, setting) - state.readings.displacement, 0.0) / setting.stroke
-    share = np.where(new, 1.0, special.erfc(way / values["softening_reach"]))
-    return replace(state, wall_gain=state.wall_gain * (1.0 + values["first_cycle_fraction"] * share))
+    way = np.maximum(level_stroke(state, setting) - state.readings.displacement, 0.0)
+    return np.where(new, 0.0, way)
+
+
+def _virgin(whole: bool, fades: bool, over_test: bool = False) -> Apply:
+    """As new where it had never been stretched so far; from then on the softer, the farther from there."""
+
+    def apply(state: State, values: Values, setting: Setting) -> State:
+        way = state.readings.behind if over_test else _level_way(state, setting)
+        share = special.erfc(way / setting.stroke / values["softening_reach"])
+        if fades:
+            share = share * state.readings.cycle ** -np.minimum(values["cycle_exponent"], 20.0)
+        gain = 1.0 + values["first_cycle_fraction"] * share
+        if whole:
+            return replace(state, gain=state.gain * gain)
+        return replace(state, wall_gain=state.wall_gain * gain)
+
+    return apply
+
+
+def _reach_and_exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (*_reach(setting), *_exponent(setting))
 
 
 def _reach(setting: Setting) -> tuple[Parameter, ...]:
@@ -103,11 +123,20 @@ register(
             "force-power": _by_power(whole=True, over_test=False),
             "test-power": _by_power(whole=False, over_test=True),
             "test-force-power": _by_power(whole=True, over_test=True),
-            "virgin": _virgin,
+            "virgin": _virgin(whole=False, fades=False),
+            "virgin-fading": _virgin(whole=False, fades=True),
+            "force-fading": _virgin(whole=True, fades=True),
+            "test-virgin": _virgin(whole=False, fades=False, over_test=True),
         },
-        own=dict.fromkeys(POWERS, _exponent) | {"virgin": _reach},
+        own=dict.fromkeys(POWERS, _exponent)
+        | dict.fromkeys(("virgin", "test-virgin"), _reach)
+        | dict.fromkeys(FADING, _reach_and_exponent),
+        apart=("virgin-fading",),
         sources=dict.fromkeys(POWERS, "textbook: power of the cycle count (steep: the first cycle alone)")
-        | {"virgin": "Ogden & Roxburgh 1999, with the distance to the longest stroke in place of energies"},
+        | dict.fromkeys(
+            ("virgin", "test-virgin", *FADING),
+            "Ogden & Roxburgh 1999, with the distance to the longest stroke in place of energies",
+        ),
         kinds={
             "force": "here the whole muscle, not the bladder alone",
             "test": "here in the first cycles of the whole test, not of each level",
