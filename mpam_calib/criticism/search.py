@@ -37,7 +37,7 @@ from mpam_calib.model.effect import effect
 
 Array = NDArray[np.float64]
 
-RATE = 0.001
+RATE = 0.01
 """Prior odds of one more cause: a passenger must not come close to the set that it rides on."""
 WIDTH = 6
 """Sets of each size that are extended further."""

@@ -18,7 +18,7 @@ Word = Literal["adequate", "named", "ambiguous", "unexplained"]
 
 SURE, LEAD = 0.95, 5.0
 """Probability that the named set holds, and nats by which it leads."""
-STANDS = 20.0
+STANDS = 25.0
 """The same for a cause beside structure that no set removes: odds of models that are known to be wrong."""
 LISTED = 5
 BESIDE = 10.0

@@ -59,7 +59,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
         *("bent", "settling", "settling-bent", "tared", "tared-bent"),
         *("early", "power", "thermal", "return"),
     ),
-    "pressure_droop": ("bent", "level", "level-bent", "power", "level-power", "speed"),
+    "pressure_droop": ("bent", "level", "level-bent", "power", "level-power", "speed", "lagging"),
     "rig_compliance": ("bent", "power", "toe", "preload"),
     "law_shape": ("bent", "exponential"),
     "order_too_low": ("bent", "steady", "steady-bent", "fung", "gent"),

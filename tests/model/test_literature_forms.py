@@ -197,7 +197,10 @@ def test_a_form_starts_near_the_effect_s_own_equation(form: str) -> None:
     assert 0.5 <= other / own <= 2.0
 
 
-@pytest.mark.parametrize("form", ["length_offset:slip", "length_offset:settling", "pressure_droop:speed"])
+@pytest.mark.parametrize(
+    "form",
+    ["length_offset:slip", "length_offset:settling", "pressure_droop:speed", "pressure_droop:lagging"],
+)
 def test_a_form_with_a_memory_says_so(form: str) -> None:
     assert effect(form).memory and not effect(form.partition(":")[0]).memory
 

@@ -202,3 +202,15 @@ def test_a_dwell_does_not_slow_a_stroke_down(dwell):
     blueprint = draw_blueprint(build.specimen({"law": "linear", "order": 2}, made), build.PLAIN)
     share = 1.0 - 2.0 * np.arccos(1.0 - 2.0 * 0.005) / np.pi
     assert blueprint.setting().speed == pytest.approx(0.99 / share * STROKE / HALF, rel=0.03)
+
+
+def test_a_stroke_knows_what_was_stretched_before():
+    """The first is as new at both points of every bin; the second lies behind it by what it came back."""
+    made, _ = gentle(300, strokes=3)
+    bins = bin_loops(made, 16)
+    low, high = (bins.readings.take(half) for half in (slice(0, len(bins)), slice(len(bins), None)))
+    first, others = bins.segment == 0, bins.segment > 0
+    for point in (low, high):
+        np.testing.assert_array_equal(point.behind[first], 0.0)
+        longest = float(made.displacement_m.max())
+        assert point.behind[others] == pytest.approx(longest - point.displacement[others], abs=1e-3 * STROKE)

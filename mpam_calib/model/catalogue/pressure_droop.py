@@ -14,6 +14,9 @@ from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
 
+LAG_SHARE, NO_WAY = 0.1, 1e-12
+"""A supply's typical lag over a stroke's time; a way (m) as good as none."""
+
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (
@@ -61,6 +64,21 @@ def _flow_exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("flow_exponent", Normal(0.5, 0.5), "power of the speed", "textbook", ""),)
 
 
+def _lagging(state: State, values: Values, setting: Setting) -> State:
+    """The droop follows the stroke with a lag τ: v·τ behind it, gradually after a turn (at one speed v)."""
+    readings = state.readings
+    way = np.maximum(readings.pace * values["supply_lag_s"], NO_WAY)
+    behind = way * (1.0 - (1.0 + readings.reversal) * np.exp(-readings.travel / way))
+    part = (state.displacement + readings.sign * behind) / setting.stroke
+    return _drooped(state, values, np.maximum(part, 0.0))
+
+
+def _lag(setting: Setting) -> tuple[Parameter, ...]:
+    stroke_time = setting.stroke / setting.speed if setting.speed > 0.0 else 1.0
+    prior = LogNormal(LAG_SHARE * stroke_time, 0.7)
+    return (Parameter("supply_lag_s", prior, "time in which the supply follows the stroke", "textbook"),)
+
+
 register(
     Effect(
         id="pressure_droop",
@@ -72,13 +90,20 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"level": _level, "power": _power, "level-power": _level_power, "speed": _speed},
-        own={"power": _exponent, "level-power": _exponent, "speed": _flow_exponent},
-        recalls=("speed",),
+        forms={
+            "level": _level,
+            "power": _power,
+            "level-power": _level_power,
+            "speed": _speed,
+            "lagging": _lagging,
+        },
+        own={"power": _exponent, "level-power": _exponent, "speed": _flow_exponent, "lagging": _lag},
+        recalls=("speed", "lagging"),
         sources={
             "power": "textbook: quadratic in the stroke; near 0.8 in proportion to the muscle's volume",
             "level-power": "the same over each level's own stroke",
             "speed": "line losses: Hagen-Poiseuille ∝ flow, turbulent or orifice ∝ flow²",
+            "lagging": "textbook: first-order lag of a regulator or a line, τ·dy/dt + y = x",
         },
         kinds={"level": "here full stroke is each level's own"},
         bends={"contraction": 3, "pace": 1},

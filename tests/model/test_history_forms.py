@@ -1,0 +1,124 @@
+"""Forms that go by what was before, against the process that they stand for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from mpam_calib.model.effect import effect
+from mpam_calib.model.readings import Readings
+from mpam_calib.model.state import Setting
+
+from .test_literature_forms import LEVELS, SPEED, rows, setting_for, start
+
+STEPS = 400
+"""Readings of a stroke."""
+
+
+def driven(setting: Setting, strokes: int = 4) -> Readings:
+    """Triangles at one speed and one pressure, from a rest at no contraction."""
+    way = (np.arange(STEPS) + 0.5) / STEPS * setting.stroke
+    number = np.repeat(np.arange(strokes), STEPS)
+    x = np.concatenate([way if i % 2 == 0 else setting.stroke - way for i in range(strokes)])
+    return replace(
+        rows(setting, len(x)),
+        pressure=np.full(len(x), LEVELS[-1] * 1e3),
+        displacement=x,
+        sign=np.where(number % 2 == 0, -1.0, 1.0),
+        cycle=number // 2 + 1.0,
+        travel=np.tile(way, strokes),
+        reversal=(number > 0).astype(float),
+        behind=np.maximum.accumulate(x) - x,
+        speed=np.full(len(x), SPEED),
+        pace=np.full(len(x), SPEED),
+    )
+
+
+def one(value: float) -> np.ndarray:
+    return np.full((1, 1), value)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.2])
+def test_a_lagging_supply_is_a_first_order_lag(share: float) -> None:
+    """Of the stroke, with so much of a stroke's time as its constant; what earlier strokes left is gone."""
+    setting = setting_for("pressure_droop:lagging")
+    readings, lag = driven(setting), share * setting.stroke / SPEED
+    step = setting.stroke / STEPS / SPEED
+    decay = np.exp(-step / lag)
+    # Half a step before the first reading the muscle was at rest at no contraction.
+    lagged = signal.lfilter([1.0 - decay], [1.0, -decay], readings.displacement)
+    values = {"droop_percent": one(0.08), "supply_lag_s": one(lag)}
+    state = effect("pressure_droop:lagging").apply(start(setting, readings), values, setting)
+    found = (1.0 - state.pressure / readings.pressure)[0] / 0.08
+    left = np.exp(-1.0 / share)
+    assert found == pytest.approx(lagged / setting.stroke, abs=2.0 / STEPS + 2.0 * left)
+
+
+def test_a_supply_without_a_lag_is_the_plain_droop() -> None:
+    setting = setting_for("pressure_droop:lagging")
+    readings = driven(setting)
+    values = {"droop_percent": one(0.08), "supply_lag_s": one(1e-9)}
+    plain, lagging = (
+        effect(form).apply(start(setting, readings), values, setting).pressure
+        for form in ("pressure_droop", "pressure_droop:lagging")
+    )
+    np.testing.assert_allclose(lagging, plain, rtol=1e-9)
+
+
+@pytest.mark.parametrize("exponent", [0.0, 0.5, 1.0])
+def test_friction_from_rest_builds_up_as_sliders_do(exponent: float) -> None:
+    """Springs with sliders, their ways spread as Dahl's law has it, driven step by step."""
+    setting = setting_for("presliding:masing-dahl")
+    readings = driven(setting, strokes=3)
+    reversal = 0.1 * setting.stroke
+    values = {"reversal_mm": one(reversal), "dahl_exponent": one(exponent)}
+    sign = effect("presliding:masing-dahl").apply(start(setting, readings), values, setting).sign[0]
+    # After a turn 1 − s/2 is the friction not yet turned over: −g′(way)·way of it slides at that way.
+    ways = np.linspace(1e-5, 1.0, 4000) * setting.stroke
+    turn = ways / reversal
+    beyond = exponent - 1.0
+    left = np.exp(-turn) if beyond == 0.0 else np.maximum(1.0 + beyond * turn, 0.0) ** (-1.0 / beyond)
+    weights = np.gradient(np.gradient(left, ways), ways) * ways
+    weights /= weights.sum()
+    load, friction, before = np.zeros(len(ways)), [], 0.0
+    for x in readings.displacement:
+        load = np.clip(load + 2.0 * (x - before) / ways, -1.0, 1.0)
+        friction.append(-float(weights @ load))
+        before = x
+    assert sign == pytest.approx(np.array(friction), abs=0.03)
+
+
+def test_rubber_is_as_new_on_its_first_stroke_and_at_the_end_of_every_other() -> None:
+    setting = setting_for("stress_softening:virgin-fading")
+    readings = replace(driven(setting), level=np.zeros(4 * STEPS, dtype=np.int64))
+    setting = replace(setting, strokes=None)
+    values = {
+        "first_cycle_fraction": one(0.3), "softening_reach": one(0.2), "cycle_exponent": one(1.0),
+    }  # fmt: skip
+    gain = effect("stress_softening:virgin-fading").apply(start(setting, readings), values, setting).wall_gain
+    excess = np.broadcast_to(gain, (1, 4 * STEPS))[0] - 1.0
+    np.testing.assert_allclose(excess[:STEPS], 0.3)
+    assert excess[STEPS] == pytest.approx(0.3, rel=0.02)  # at the turn the way is none
+    assert excess[3 * STEPS] == pytest.approx(0.15, rel=0.02)  # in the second cycle half is left
+    np.testing.assert_allclose(excess[2 * STEPS - 1 : 2 * STEPS + 1], 0.0, atol=1e-9)  # at no contraction
+
+
+def test_over_a_test_only_what_was_never_stretched_is_as_new() -> None:
+    """A stroke of half the length before the whole one: its first half has softened."""
+    setting = setting_for("stress_softening:test-virgin")
+    whole = driven(setting, strokes=1)
+    half = replace(whole, displacement=0.5 * whole.displacement)
+    x = np.concatenate([half.displacement, whole.displacement])
+    readings = replace(
+        Readings.join([half, whole]), behind=np.maximum.accumulate(x) - x, cycle=np.ones(len(x))
+    )
+    values = {"first_cycle_fraction": one(0.3), "softening_reach": one(0.05)}
+    gain = effect("stress_softening:test-virgin").apply(start(setting, readings), values, setting).wall_gain
+    excess = np.broadcast_to(gain, (1, len(x)))[0] - 1.0
+    np.testing.assert_allclose(excess[:STEPS], 0.3)
+    again = excess[STEPS:]
+    np.testing.assert_allclose(again[whole.displacement < 0.3 * setting.stroke], 0.0, atol=1e-6)
+    np.testing.assert_allclose(again[whole.displacement > 0.5 * setting.stroke], 0.3)
