@@ -49,7 +49,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "stress_softening": (
         *("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),
         *("power", "force-power", "test-power", "test-force-power"),
-        *("virgin", "virgin-fading", "force-fading", "test-virgin"),
+        *("virgin", "virgin-fading", "force-fading", "test-virgin", "test-force-virgin"),
     ),
     "creep": (
         *("bent", "wall", "wall-bent", "early", "power", "solid"),

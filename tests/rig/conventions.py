@@ -66,6 +66,12 @@ def _beyond_the_longest(rows: Rows) -> Array:
     return np.where(_first_stretching(rows) > 0.0, 1.0, near * 0.5 ** (rows.cycle - 1.0))
 
 
+def _further_than_ever(rows: Rows) -> Array:
+    """As new within a tenth of the longest stroke so far, whichever level it was at."""
+    longest = np.maximum.accumulate(rows.displacement)
+    return np.exp(-(((longest - rows.displacement) / (0.1 * rows.displacement.max())) ** 2))
+
+
 def _lagging(rows: Rows) -> Array:
     return rows.level_fraction * rows.nominal_speed / rows.nominal_speed.max()
 
@@ -130,6 +136,7 @@ CONVENTIONS: dict[str, Form] = {
         _by("first_stretching", "stress_softening", _stiffer(_first_stretching)),
         # Rubber is as new beyond its longest stretch so far.
         _by("beyond_the_longest", "stress_softening", _stiffer(_beyond_the_longest)),
+        _by("further_than_ever", "stress_softening", _stiffer(_further_than_ever)),
         # No reversal begins a level's first stroke: friction does not turn over on it.
         _by("sliding_at_first", "presliding", _sliding_at_first),
         # Friction builds up from none on a level's first stroke: Maxwell's slip.

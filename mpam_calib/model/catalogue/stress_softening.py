@@ -16,9 +16,14 @@ from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
 Apply = Callable[[State, Values, Setting], State]
+Share = Callable[[State, Values, Setting], Array]
+"""How much of the excess is left, (B or 1, n), from 1 to 0."""
+Fading = Callable[[Array, Values], Array]
+"""The same from cycle to cycle."""
 
-FADING = ("virgin-fading", "force-fading")
 POWERS = ("power", "force-power", "test-power", "test-force-power")
+REACHING = ("virgin", "test-virgin", "test-force-virgin")
+FADING = ("virgin-fading", "force-fading")
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -27,47 +32,53 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     )
 
 
-def _excess(values: Values, cycle: Array) -> Array:
-    return np.asarray(values["first_cycle_fraction"] * np.exp(-(cycle - 1.0)))
-
-
-def _apply(state: State, values: Values, setting: Setting) -> State:
-    gain = 1.0 + _excess(values, state.readings.cycle)
-    return replace(state, wall_gain=state.wall_gain * gain)
-
-
-def _force(state: State, values: Values, setting: Setting) -> State:
-    """The whole muscle is stiffer, not the bladder alone."""
-    return replace(state, gain=state.gain * (1.0 + _excess(values, state.readings.cycle)))
-
-
-def _test(state: State, values: Values, setting: Setting) -> State:
-    """In the first cycles of the whole test: what has softened stays soft at the levels that follow."""
-    gain = 1.0 + _excess(values, state.readings.test_cycle)
-    return replace(state, wall_gain=state.wall_gain * gain)
-
-
-def _test_force(state: State, values: Values, setting: Setting) -> State:
-    """The whole muscle, in the first cycles of the whole test."""
-    return replace(state, gain=state.gain * (1.0 + _excess(values, state.readings.test_cycle)))
-
-
-def _by_power(whole: bool, over_test: bool) -> Apply:
-    """The excess as a power of the cycle: slow, or all but the first cycle's alone."""
-
-    def apply(state: State, values: Values, setting: Setting) -> State:
-        cycle = state.readings.test_cycle if over_test else state.readings.cycle
-        fading = cycle ** -np.minimum(values["cycle_exponent"], 20.0)
-        gain = 1.0 + values["first_cycle_fraction"] * fading
-        if whole:
-            return replace(state, gain=state.gain * gain)
-        return replace(state, wall_gain=state.wall_gain * gain)
-
-    return apply
-
-
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("cycle_exponent", LogNormal(0.8, 0.6), "power of the cycle count", "textbook", ""),)
+
+
+def _reach(setting: Setting) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "softening_reach", LogNormal(0.3, 0.5), "share of the stroke over which it softens", "", ""
+        ),
+    )
+
+
+def _reach_and_exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (*_reach(setting), *_exponent(setting))
+
+
+def _exponential(cycle: Array, values: Values) -> Array:
+    return np.exp(1.0 - cycle)
+
+
+def _power(cycle: Array, values: Values) -> Array:
+    """Slow, or all but the first cycle's alone."""
+    return np.asarray(cycle ** -np.minimum(values["cycle_exponent"], 20.0))
+
+
+def _constant(cycle: Array, values: Values) -> Array:
+    return np.ones_like(cycle)
+
+
+def _by_cycle(fading: Fading, over_test: bool = False) -> Share:
+    """By a level's cycles, or the whole test's: what has softened stays soft at the levels that follow."""
+
+    def share(state: State, values: Values, setting: Setting) -> Array:
+        return fading(state.readings.test_cycle if over_test else state.readings.cycle, values)
+
+    return share
+
+
+def _by_stretch(fading: Fading, over_test: bool = False) -> Share:
+    """As new where it had never been stretched so far; from then on the softer, the farther from there."""
+
+    def share(state: State, values: Values, setting: Setting) -> Array:
+        way = state.readings.behind if over_test else _level_way(state, setting)
+        near = special.erfc(way / setting.stroke / values["softening_reach"])
+        return np.asarray(near * fading(state.readings.cycle, values))
+
+    return share
 
 
 def _level_way(state: State, setting: Setting) -> Array:
@@ -77,32 +88,22 @@ def _level_way(state: State, setting: Setting) -> Array:
     return np.where(new, 0.0, way)
 
 
-def _virgin(whole: bool, fades: bool, over_test: bool = False) -> Apply:
-    """As new where it had never been stretched so far; from then on the softer, the farther from there."""
-
+def _bladder(share: Share) -> Apply:
     def apply(state: State, values: Values, setting: Setting) -> State:
-        way = state.readings.behind if over_test else _level_way(state, setting)
-        share = special.erfc(way / setting.stroke / values["softening_reach"])
-        if fades:
-            share = share * state.readings.cycle ** -np.minimum(values["cycle_exponent"], 20.0)
-        gain = 1.0 + values["first_cycle_fraction"] * share
-        if whole:
-            return replace(state, gain=state.gain * gain)
+        gain = 1.0 + values["first_cycle_fraction"] * share(state, values, setting)
         return replace(state, wall_gain=state.wall_gain * gain)
 
     return apply
 
 
-def _reach_and_exponent(setting: Setting) -> tuple[Parameter, ...]:
-    return (*_reach(setting), *_exponent(setting))
+def _muscle(share: Share) -> Apply:
+    """The whole muscle is stiffer, not the bladder alone."""
 
+    def apply(state: State, values: Values, setting: Setting) -> State:
+        gain = 1.0 + values["first_cycle_fraction"] * share(state, values, setting)
+        return replace(state, gain=state.gain * gain)
 
-def _reach(setting: Setting) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            "softening_reach", LogNormal(0.3, 0.5), "share of the stroke over which it softens", "", ""
-        ),
-    )
+    return apply
 
 
 register(
@@ -114,27 +115,28 @@ register(
         told_by="five more cycles at one level, and the first level again at the end",
         source="exponential in the cycle count: bladder stress × (1 + fraction·e^(1 − cycle))",
         parameters=_parameters,
-        apply=_apply,
+        apply=_bladder(_by_cycle(_exponential)),
         forms={
-            "force": _force,
-            "test": _test,
-            "test-force": _test_force,
-            "power": _by_power(whole=False, over_test=False),
-            "force-power": _by_power(whole=True, over_test=False),
-            "test-power": _by_power(whole=False, over_test=True),
-            "test-force-power": _by_power(whole=True, over_test=True),
-            "virgin": _virgin(whole=False, fades=False),
-            "virgin-fading": _virgin(whole=False, fades=True),
-            "force-fading": _virgin(whole=True, fades=True),
-            "test-virgin": _virgin(whole=False, fades=False, over_test=True),
+            "force": _muscle(_by_cycle(_exponential)),
+            "test": _bladder(_by_cycle(_exponential, over_test=True)),
+            "test-force": _muscle(_by_cycle(_exponential, over_test=True)),
+            "power": _bladder(_by_cycle(_power)),
+            "force-power": _muscle(_by_cycle(_power)),
+            "test-power": _bladder(_by_cycle(_power, over_test=True)),
+            "test-force-power": _muscle(_by_cycle(_power, over_test=True)),
+            "virgin": _bladder(_by_stretch(_constant)),
+            "virgin-fading": _bladder(_by_stretch(_power)),
+            "force-fading": _muscle(_by_stretch(_power)),
+            "test-virgin": _bladder(_by_stretch(_constant, over_test=True)),
+            "test-force-virgin": _muscle(_by_stretch(_constant, over_test=True)),
         },
         own=dict.fromkeys(POWERS, _exponent)
-        | dict.fromkeys(("virgin", "test-virgin"), _reach)
+        | dict.fromkeys(REACHING, _reach)
         | dict.fromkeys(FADING, _reach_and_exponent),
         apart=("virgin-fading",),
         sources=dict.fromkeys(POWERS, "textbook: power of the cycle count (steep: the first cycle alone)")
         | dict.fromkeys(
-            ("virgin", "test-virgin", *FADING),
+            (*REACHING, *FADING),
             "Ogden & Roxburgh 1999, with the distance to the longest stroke in place of energies",
         ),
         kinds={
