@@ -99,7 +99,7 @@ def test_a_further_cause_that_the_data_do_not_exclude_is_listed(
     first = found.fits[CAUSE, 0]
     others = [f"effect_{i}" for i in range(2 * LISTED + 1)]
     for i, other in enumerate([*others, "creep"]):
-        behind = gap if other == "creep" else 1.0 + 0.1 * i
+        behind = gap if other == "creep" else 2.0 + 0.1 * i
         fitted = replace(first, log_evidence=first.log_evidence - behind)
         found.fits[CAUSE | {other}, 0] = fitted
     found.tested = (*CAUSE, "creep")
