@@ -140,17 +140,22 @@ def _header(lines: Sequence[str], declared: Csv, wanted: set[str]) -> tuple[int,
     """The row (from 0) and delimiter that find most of the wanted names; else the first row."""
     delimiters = (declared.delimiter,) if declared.delimiter else _DELIMITERS
     first = declared.skip_rows or 0
-    rows = [row for row in range(first, len(lines)) if lines[row].strip()]
-    if not rows:
-        rows = [max(row for row, line in enumerate(lines) if line.strip())]
-    rows = rows[:1] if declared.skip_rows is not None else rows[:HEADER_ROWS]
+    filled = [row for row, line in enumerate(lines) if line.strip()]
+    rows = [row for row in filled if row >= first] or filled[-1:]
     lower = {name.lower() for name in wanted}
 
     def merit(choice: tuple[int, str]) -> tuple[int, int, int]:
         cells = _split(lines[choice[0]], choice[1])
         return len(lower.intersection(map(str.lower, cells))), -choice[0], len(cells)
 
-    return max(((row, delimiter) for row in rows for delimiter in delimiters), key=merit)
+    def best(rows: Sequence[int]) -> tuple[int, str]:
+        return max(((row, delimiter) for row in rows for delimiter in delimiters), key=merit)
+
+    if declared.skip_rows is None:
+        return best(rows[:HEADER_ROWS])
+    # Where the row holds none of the names, the declaration was meant for another file of the specimen.
+    found, elsewhere = best(rows[:1]), best(filled[:HEADER_ROWS])
+    return elsewhere if merit(found)[0] == 0 < merit(elsewhere)[0] else found
 
 
 def _fields(

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mpam_calib.errors import InputError
 from mpam_calib.specimen import read
 from mpam_calib.specimen.blocks import read_blocks
 from mpam_calib.specimen.declaration import Csv
@@ -77,6 +78,21 @@ def test_declared_format(tmp_path: Path) -> None:
     text = "made by;rig 3\nunits, below\n" + PLAIN.replace(",", "|")
     declaration = DECLARATION + '[csv]\ndelimiter = "|"\ndecimal = "."\nskip_rows = 2\n'
     assert read(make(tmp_path, declaration, loops=text)).files[0].delimiter == "|"
+
+
+def test_rows_to_skip_in_one_file_are_not_skipped_in_another(tmp_path: Path) -> None:
+    declaration = DECLARATION.replace("[files]\n", '[files]\nblocked_force = "blocked_force.csv"\n')
+    folder = make(tmp_path, declaration + "[csv]\nskip_rows = 2\n", loops="rig 3\nunits, below\n" + PLAIN)
+    (folder / "blocked_force.csv").write_text("pressure_kPa,force_N\n50,3.5\n75,6\n100,9\n")
+    found = read(folder)
+    assert found.blocked_force is not None
+    assert found.blocked_force.force_N == pytest.approx([3.5, 6.0, 9.0])
+
+
+def test_a_header_that_is_nowhere_is_missed_where_it_is_declared(tmp_path: Path) -> None:
+    text = "made by;rig 3\nunits, below\nt,p,x,F\n" + PLAIN.partition("\n")[2]
+    with pytest.raises(InputError, match=r"loops.csv:3"):
+        read(make(tmp_path, DECLARATION + "[csv]\nskip_rows = 2\n", loops=text))
 
 
 def test_a_rigs_own_columns(tmp_path: Path) -> None:
