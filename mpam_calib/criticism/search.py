@@ -31,6 +31,7 @@ from mpam_calib.criticism.refits import (
     with_better_forms,
     with_doubt,
 )
+from mpam_calib.criticism.screen import promising
 from mpam_calib.criticism.spread import Alone, Spread
 from mpam_calib.model.bend import is_bend
 from mpam_calib.model.effect import effect
@@ -45,9 +46,13 @@ LEADING_SHARE = 3
 """One in so many of these is extended by every effect."""
 PARTNERS = 8
 """Best single effects that are tried as partners of every kept set."""
+SCREENED = 20
+"""Sets of three that straight lines along the pairs promise most of."""
 LARGEST = 3
 CARRIED = 60
 """Leading sets that go on once the noise is settled."""
+MUCH_LESS = 0.8
+"""Scale of the noise down to which the forms that were chosen before need not be chosen again."""
 NEAR, POLISHED = 25.0, 40
 """Nats behind the best within which sets are tried in all their forms, and how many of these at most."""
 LEADERS = 5
@@ -124,7 +129,8 @@ class Search:
             return [((), {})]
         if len(effects) == 1:
             names = _own_names(self.problem, effects)
-            starts = [{}, *(dict.fromkeys(names, value) for value in STARTS if names)]
+            far = [dict.fromkeys(names, value) for value in STARTS if names]
+            starts = [{}, *(far if near is None else [ended(near)])]
             return [((form,), start) for e in effects for form in flexible(e) for start in starts]
         if near is not None:
             return [(tuple(sorted(near.effects)), ended(near))]
@@ -166,11 +172,11 @@ class Search:
         return self.fits[effects, self.best_size(effects)] if seen else None
 
     def polish_all(self, keys: Iterable[tuple[Set, int]]) -> None:
-        """Change one form of a set at a time, as long as that helps."""
+        """Change one form of a set at a time; what that helped is not done yet."""
         todo = [k for k in dict.fromkeys(keys) if k in self.fits and k not in self.polished]
-        self.polished.update(todo)
-        better = self.spread(with_better_forms, [self.fits[key] for key in todo])
-        self.fits.update(zip(todo, better, strict=True))
+        better = dict(zip(todo, self.spread(with_better_forms, [self.fits[k] for k in todo]), strict=True))
+        self.polished |= {k for k, f in better.items() if f.effects == self.fits[k].effects}
+        self.fits.update(better)
 
     def polish_near(self) -> None:
         """Polish all that may yet lead: in the bent forms of the search a true set may trail some nats."""
@@ -262,9 +268,12 @@ def search(
         best = found.sets[0]
         fits = [f for (effects, _), f in found.fits.items() if effects == best]
         # Never up: what is left beyond the noise may be a cause that the best set still lacks.
-        settled = problem.with_noise_scale(min(noise_scale(problem, fits), 1.0))
+        scale = min(noise_scale(problem, fits), 1.0)
+        settled = problem.with_noise_scale(scale)
         with journalled(settled, workers, journal) as spread:
+            polished = found.polished if scale > MUCH_LESS else set()
             found = found.on(settled, spread)
+            found.polished |= polished
             _finish(found, tell)
     found.spread = Alone(found.problem)
     return found
@@ -290,11 +299,16 @@ def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
         tries |= {s | {p} for s in kept[: width // LEADING_SHARE] for p in tested if p not in s}
         for size in (0, 1):
             found.refit_all((effects, size) for effects in sorted(tries, key=sorted))
+        if k == LARGEST and width >= WIDTH:
+            # A kept set may hold a stand-in for two causes, whose own pairs all trail behind it.
+            screened = promising(found.problem, found.fits, tested, k - 1)[:SCREENED]
+            found.refit_all((effects, 0) for effects in screened)
         tell(0.4 if k == 2 else 0.75)
         kept = _keep(found, k, width)
         for size in every:
             found.refit_all((effects, size) for effects in kept)
-        _polish(found, kept)
+        if k < LARGEST:
+            _polish(found, kept)
     found.polish_near()
 
 
