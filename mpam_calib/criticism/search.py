@@ -52,7 +52,7 @@ LARGEST = 3
 CARRIED = 60
 """Leading sets that go on once the noise is settled."""
 MUCH_LESS = 0.8
-"""Scale of the noise down to which the forms that were chosen before need not be chosen again."""
+"""Scale of the noise down to which forms that were tried before, and stayed, need not be tried again."""
 NEAR, POLISHED = 25.0, 40
 """Nats behind the best within which sets are tried in all their forms, and how many of these at most."""
 LEADERS = 5
@@ -71,7 +71,8 @@ class Search:
     tested: tuple[str, ...]
     spread: Spread
     fits: dict[tuple[Set, int], Fit] = field(default_factory=dict)
-    polished: set[tuple[Set, int]] = field(default_factory=set)
+    polished: dict[tuple[Set, int], bool] = field(default_factory=dict)
+    """Fits whose forms were changed one at a time, and whether that left them as they were."""
     doubting: bool = False
     """Whether a fit also doubts the forms of its effects: only the leading sets are worth that."""
     searched: dict[tuple[Set, int], Fit] = field(default_factory=dict)
@@ -172,10 +173,10 @@ class Search:
         return self.fits[effects, self.best_size(effects)] if seen else None
 
     def polish_all(self, keys: Iterable[tuple[Set, int]]) -> None:
-        """Change one form of a set at a time; what that helped is not done yet."""
+        """Change one form of a set at a time, as long as that helps."""
         todo = [k for k in dict.fromkeys(keys) if k in self.fits and k not in self.polished]
         better = dict(zip(todo, self.spread(with_better_forms, [self.fits[k] for k in todo]), strict=True))
-        self.polished |= {k for k, f in better.items() if f.effects == self.fits[k].effects}
+        self.polished |= {k: f.effects == self.fits[k].effects for k, f in better.items()}
         self.fits.update(better)
 
     def polish_near(self) -> None:
@@ -271,9 +272,9 @@ def search(
         scale = min(noise_scale(problem, fits), 1.0)
         settled = problem.with_noise_scale(scale)
         with journalled(settled, workers, journal) as spread:
-            polished = found.polished if scale > MUCH_LESS else set()
-            found = found.on(settled, spread)
-            found.polished |= polished
+            before, found = found, found.on(settled, spread)
+            if scale > MUCH_LESS:
+                found.polished = {k: True for k, stayed in before.polished.items() if stayed}
             _finish(found, tell)
     found.spread = Alone(found.problem)
     return found
