@@ -29,9 +29,9 @@ def promising(
     reached: dict[Set, float] = {}
     for base in sorted((s for s in known if len(s) == count), key=sorted):
         residual = force - known[base]
-        parts = [base - {e} for e in sorted(base) if base - {e} in known]
+        parts = dict.fromkeys([frozenset[str](), *(base - {e} for e in sorted(base))])
         for new in tested:
-            lines = [known[p | {new}] - known[p] for p in {*parts, frozenset()} if p | {new} in known]
+            lines = [known[p | {new}] - known[p] for p in parts if {p, p | {new}} <= known.keys()]
             if new in base or not lines:
                 continue
             found = fits[base, 0].log_evidence + _gain(np.array(lines), residual)
