@@ -34,13 +34,13 @@ def promising(
             lines = [known[p | {new}] - known[p] for p in parts if {p, p | {new}} <= known.keys()]
             if new in base or not lines:
                 continue
-            found = fits[base, 0].log_evidence + _gain(np.array(lines), residual)
+            found = fits[base, 0].log_evidence + gain(np.array(lines), residual)
             reached[base | {new}] = max(found, reached.get(base | {new}, -np.inf))
     return sorted(reached, key=lambda s: (-reached[s], sorted(s)))
 
 
-def _gain(lines: Array, residual: Array) -> float:
-    """Nats that one step along lines (k, n) would gain on a residual (n,), all whitened."""
+def gain(lines: Array, residual: Array) -> float:
+    """Nats that one linear step along lines (k, n) would gain on a residual (n,), all whitened."""
     power = lines @ lines.T
     damped = power + (LEVEL * np.trace(power) + 1e-9) * np.eye(len(lines))
     along = lines @ residual

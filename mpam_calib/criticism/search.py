@@ -31,7 +31,7 @@ from mpam_calib.criticism.refits import (
     with_better_forms,
     with_doubt,
 )
-from mpam_calib.criticism.screen import promising
+from mpam_calib.criticism.screen import gain, promising
 from mpam_calib.criticism.spread import Alone, Spread
 from mpam_calib.model.bend import is_bend
 from mpam_calib.model.effect import effect
@@ -376,5 +376,4 @@ def _gain(found: Search, effects: Set, partner: str, size: int) -> float:
         return -np.inf
     signature = found.problem.white(single.force - nothing.force, size)
     residual = found.problem.white(found.problem.force - base.force, size)
-    power = float(signature @ signature)
-    return 0.5 * float(signature @ residual) ** 2 / power if power > 1e-12 else 0.0
+    return gain(signature[None], residual)

@@ -39,7 +39,7 @@ LEVELS: dict[str, Literal["good", "caution", "bad"]] = {
 }
 SENTENCES = {
     "adequate": "The declared simulation leaves nothing but noise: these data show no fault in it.",
-    "named": "The declared simulation is wrong, and the cause has a name.",
+    "named": "The declared simulation is wrong, and what is wrong has a name.",
     "ambiguous": "The declared simulation is wrong, and these data cannot tell several causes apart.",
     "unexplained": "The declared simulation is wrong in a way that no known set of causes removes.",
 }

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mpam_calib.criticism.refits import Set
-from mpam_calib.criticism.screen import _gain, promising
+from mpam_calib.criticism.screen import gain, promising
 
 Array = NDArray[np.float64]
 Columns = Callable[[Set], Array]
@@ -55,7 +55,7 @@ def test_on_straight_lines_it_foresees_the_best_triple() -> None:
     assert set(order) == set(map(frozenset, combinations(EFFECTS, 3)))
 
 
-def test_a_stand_in_for_two_causes_does_not_hide_them() -> None:
+def test_a_stand_in_does_not_hide_the_causes_it_stands_in_for() -> None:
     """Effect h alone makes up for all three: every pair of the true set trails behind those with h."""
     rng = np.random.default_rng(5)
     own = dict(zip(EFFECTS, np.linalg.qr(rng.standard_normal((60, 8)))[0].T, strict=True))
@@ -100,5 +100,5 @@ def test_lines_that_are_alike_count_once() -> None:
     rng = np.random.default_rng(9)
     line, residual = rng.standard_normal((2, 60))
     once = refit(residual, stack(line)).log_evidence + 0.5 * float(residual @ residual)
-    assert _gain(np.array([line]), residual) == pytest.approx(once, rel=1e-4)
-    assert _gain(np.array([line, line]), residual) == pytest.approx(once, rel=1e-4)
+    assert gain(np.array([line]), residual) == pytest.approx(once, rel=1e-4)
+    assert gain(np.array([line, line]), residual) == pytest.approx(once, rel=1e-4)
