@@ -137,33 +137,45 @@ class Search:
             return [(tuple(sorted(near.effects)), ended(near))]
         # From where the best part ended, and from nothing: a part may have ended in a shape that only
         # made up for what it lacked.
-        choice, start = self._from_parts(effects, size)
-        forms = tuple(choice[e] for e in sorted(effects))
-        tries: list[Try] = [(forms, start), (forms, {})]
+        parts = self._from_parts(effects, size)
+        tries: list[Try] = []
+        for choice, start in parts:
+            forms = tuple(choice[e] for e in sorted(effects))
+            tries += [(forms, start), (forms, {})]
         if len(effects) == 2:
+            choice, _ = parts[0]
             # Alone, a cause may have taken another shape for want of its partner.
             for e in sorted(effects):
                 others = [f for f in flexible(e) if f != choice[e]]
                 tries += [(tuple((choice | {e: form}).values()), {}) for form in others]
         return tries
 
-    def _from_parts(self, effects: Set, size: int) -> tuple[dict[str, str], dict[str, float]]:
-        """Forms and sizes of the best part of a set, and of the effect that it lacks."""
+    def _from_parts(self, effects: Set, size: int) -> list[tuple[dict[str, str], dict[str, float]]]:
+        """Forms and sizes of the best part of a set, and of the effect that it lacks.
+
+        Of a pair also those that it has beside the remainder that suits it best: beside a smaller one it may
+        never have come to them.
+        """
         parts = [
             p for p in map(frozenset, combinations(sorted(effects), len(effects) - 1)) if self._known(p, size)
         ]
         if not parts:
-            return {e: flexible(e)[0] for e in effects}, {}
+            return [({e: flexible(e)[0] for e in effects}, {})]
         part = max(parts, key=self.score)
-        base = self._known(part, size)
         (new,) = effects - part
-        assert base is not None
         # Beside others a cause takes the shape that it has; alone, one that makes up for what it lacks.
         beside = [p for p in parts if new in p]
-        own = self._known(max(beside, key=self.score) if beside else frozenset([new]), size)
-        form = flexible(new)[0] if own is None else named_forms(own)[new]
-        start = {} if own is None else {n: u for n, u in ended(own).items() if not is_bend(n)}
-        return named_forms(base) | {new: form}, start | ended(base)
+        other = max(beside, key=self.score) if beside else frozenset([new])
+        found: list[tuple[dict[str, str], dict[str, float]]] = []
+        for at in (size, self.best_size(part)) if len(part) > 1 else (size,):
+            base, own = self._known(part, at), self._known(other, at)
+            assert base is not None
+            form = flexible(new)[0] if own is None else named_forms(own)[new]
+            start = {} if own is None else {n: u for n, u in ended(own).items() if not is_bend(n)}
+            choice = named_forms(base) | {new: form}
+            if all(choice != seen for seen, _ in found):
+                found.append((choice, start | ended(base)))
+        return found
 
     def _known(self, effects: Set, size: int) -> Fit | None:
         """The set's fit beside a remainder of this size, or of the size that suits it best."""

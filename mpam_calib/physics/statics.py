@@ -24,6 +24,15 @@ def thickness_force(P: Array, shape: Shape) -> Array:
     return P * (np.pi * ((2.0 * R * t - t**2) - 2.0 * t * R * shape.T))
 
 
+def work_lost_at_tips(P: Array, shape: Shape, rest: Rest) -> Array:
+    """What two conical ends of 45° take from a cylinder's force, N.
+
+    They lack V = 2π[R0ρ² + 2ρ³/3] of its volume, ρ = R − R0, on which the gas does no work: P dV/dL, with
+    dV/dR = 4πRρ and dR/dL = −R T/L (Eq. 2.10) as in :func:`gas_force`.
+    """
+    return P * 4.0 * np.pi * shape.R**2 * (shape.R - rest.R0) * shape.T / shape.L
+
+
 def axial_lever(shape: Shape) -> Array:
     """Section of the wall, π(2Rt − t²), m²: what the axial stress acts on (thesis Eq. 4.10)."""
     return np.pi * (2.0 * shape.R * shape.t - shape.t**2)

@@ -30,7 +30,7 @@ EFFECT_IDS: Final[tuple[str, ...]] = (
 EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(EFFECT_IDS, ("bent",)),
     "dead_band": ("bent", "soft", "power", "closing"),
-    "tip_shape": ("bent", "working", "power", "round", "tapered"),
+    "tip_shape": ("bent", "working", "power", "round", "tapered", "volume"),
     "braid_kinematics": ("bent", "swell", "thickness"),
     "braid_angle": ("bent", "seating"),
     "braid_stretch": ("bent", "power", "longer"),
@@ -59,7 +59,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
         *("bent", "settling", "settling-bent", "tared", "tared-bent"),
         *("early", "power", "thermal", "return"),
     ),
-    "pressure_droop": ("bent", "level", "level-bent", "power", "level-power", "speed", "lagging"),
+    "pressure_droop": ("bent", "level", "level-bent", "power", "level-power", "speed", "lagging", "volume"),
     "rig_compliance": ("bent", "power", "toe", "preload"),
     "law_shape": ("bent", "exponential"),
     "order_too_low": ("bent", "steady", "steady-bent", "fung", "gent"),

@@ -11,6 +11,7 @@ from scipy import signal
 from mpam_calib.model.effect import effect
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.state import Setting
+from mpam_calib.physics.kinematics import SHAPES
 
 from .test_literature_forms import LEVELS, SPEED, rows, setting_for, start
 
@@ -55,6 +56,24 @@ def test_a_lagging_supply_is_a_first_order_lag(share: float) -> None:
     found = (1.0 - state.pressure / readings.pressure)[0] / 0.08
     left = np.exp(-1.0 / share)
     assert found == pytest.approx(lagged / setting.stroke, abs=2.0 / STEPS + 2.0 * left)
+
+
+def test_a_supply_that_fills_a_volume_droops_in_proportion_to_it() -> None:
+    """Nothing at rest, all at full stroke, and the share of πR²L between."""
+    setting = setting_for("pressure_droop:volume")
+    readings = driven(setting)
+    values = {"droop_percent": one(0.08), "supply_lag_s": one(1e-9)}
+    before = start(setting, readings)
+    part = (
+        1.0 - effect("pressure_droop:volume").apply(before, values, setting).pressure / readings.pressure
+    ) / 0.08
+    length = np.ravel(before.rest.L0) - np.linspace(0.0, setting.stroke, 200)
+    shape = SHAPES[before.kinematics](length, before.rest)
+    volume = np.pi * np.ravel(shape.R) ** 2 * length
+    share = (volume - volume[0]) / (volume[-1] - volume[0])
+    place = readings.displacement / setting.stroke
+    assert part[0] == pytest.approx(np.interp(place, np.linspace(0.0, 1.0, 200), share), abs=1e-4)
+    assert np.max(part[0] - place) > 0.02  # and not the stroke's
 
 
 def test_a_supply_without_a_lag_is_the_plain_droop() -> None:

@@ -31,6 +31,7 @@ from mpam_calib.physics.statics import (
     strains,
     strand_strain,
     thickness_force,
+    work_lost_at_tips,
 )
 
 from . import plain
@@ -214,6 +215,23 @@ def test_the_gas_does_the_work_of_the_volume(m, P):
     slope = (volume(L + h) - volume(L - h)) / (2.0 * h)
     force = float(gas_force(np.asarray(P), SHAPES["inextensible_braid"](np.asarray(L), rest)))
     assert force == pytest.approx(-P * slope, rel=1e-6, abs=1e-7 * P * math.pi * m.R0**2)
+
+
+@cheap
+@given(tubes(), PRESSURE, st.floats(0.01, 0.25))
+def test_the_gas_does_no_work_on_what_conical_ends_lack(m, P, gamma):
+    """The ends' volume summed slice by slice, from R0 at the fitting to R one step ρ further."""
+    rest, L, h = rest_of(m), (1.0 - gamma) * m.L0, 1e-5 * m.L0
+
+    def lacking(length: float) -> float:
+        R = float(radius_inextensible_braid(np.asarray(length), rest))
+        edges = np.linspace(m.R0, R, 2001)
+        r = 0.5 * (edges[1:] + edges[:-1])
+        return 2.0 * math.pi * float(np.sum(R**2 - r**2)) * (edges[1] - edges[0])
+
+    slope = (lacking(L + h) - lacking(L - h)) / (2.0 * h)
+    lost = float(work_lost_at_tips(np.asarray(P), SHAPES["inextensible_braid"](np.asarray(L), rest), rest))
+    assert lost == pytest.approx(-P * slope, rel=1e-4)
 
 
 def test_2_25_and_2_43_by_hand():

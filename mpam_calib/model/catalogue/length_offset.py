@@ -50,14 +50,15 @@ def _exponent(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _settling(state: State, values: Values, setting: Setting) -> State:
-    """There from the start, and more or less of it at first, until a fifth of the test has passed."""
-    fading = np.exp(-state.readings.time / (0.4 * half_test(setting)))
+    """There from the start, and more or less of it at first."""
+    fading = np.exp(-state.readings.time / values["slip_s"])
     part = 1.0 + values["offset_excess"] * fading
     return replace(state, displacement=state.displacement + values["offset_mm"] * part)
 
 
 def _excess(setting: Setting) -> tuple[Parameter, ...]:
-    return (Parameter("offset_excess", Normal(0.0, 0.7), "what is more of it at first, as a share", "", ""),)
+    excess = Parameter("offset_excess", Normal(0.0, 0.7), "what is more of it at first, as a share", "", "")
+    return (excess, *_slip_time(setting))
 
 
 def _rezeroed(state: State, values: Values, setting: Setting) -> State:

@@ -11,11 +11,14 @@ from mpam_calib.model.curves import level_stroke, over_mean, power, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import HalfLongTailed, LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
+from mpam_calib.physics.kinematics import radius_inextensible_braid
 
 Array = NDArray[np.float64]
 
 LAG_SHARE, NO_WAY = 0.1, 1e-12
 """A supply's typical lag over a stroke's time; a way (m) as good as none."""
+LEAST_LENGTH = 0.05
+"""Shortest muscle that has a volume, as a share of its length at rest."""
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -66,11 +69,27 @@ def _flow_exponent(setting: Setting) -> tuple[Parameter, ...]:
 
 def _lagging(state: State, values: Values, setting: Setting) -> State:
     """The droop follows the stroke with a lag τ: v·τ behind it, gradually after a turn (at one speed v)."""
+    return _drooped(state, values, _place(state, values) / setting.stroke)
+
+
+def _volume(state: State, values: Values, setting: Setting) -> State:
+    """The same in proportion to the volume that the braid encloses and the supply has to fill."""
+
+    def volume(shortening: Array) -> Array:
+        length = np.maximum(state.rest.L0 - shortening, LEAST_LENGTH * state.rest.L0)
+        return np.asarray(radius_inextensible_braid(length, state.rest) ** 2 * length)
+
+    at_rest, full = volume(np.zeros((1, 1))), volume(np.full((1, 1), setting.stroke))
+    part = (volume(_place(state, values)) - at_rest) / (full - at_rest)
+    return _drooped(state, values, part)
+
+
+def _place(state: State, values: Values) -> Array:
+    """Where the supply has got to, m (at least the start of the stroke)."""
     readings = state.readings
     way = np.maximum(readings.pace * values["supply_lag_s"], NO_WAY)
     behind = way * (1.0 - (1.0 + readings.reversal) * np.exp(-readings.travel / way))
-    part = (state.displacement + readings.sign * behind) / setting.stroke
-    return _drooped(state, values, np.maximum(part, 0.0))
+    return np.maximum(state.displacement + readings.sign * behind, 0.0)
 
 
 def _lag(setting: Setting) -> tuple[Parameter, ...]:
@@ -96,14 +115,18 @@ register(
             "level-power": _level_power,
             "speed": _speed,
             "lagging": _lagging,
+            "volume": _volume,
         },
-        own={"power": _exponent, "level-power": _exponent, "speed": _flow_exponent, "lagging": _lag},
-        recalls=("speed", "lagging"),
+        own=dict.fromkeys(("power", "level-power"), _exponent)
+        | dict.fromkeys(("lagging", "volume"), _lag)
+        | {"speed": _flow_exponent},
+        recalls=("speed", "lagging", "volume"),
         sources={
             "power": "textbook: quadratic in the stroke; near 0.8 in proportion to the muscle's volume",
             "level-power": "the same over each level's own stroke",
             "speed": "line losses: Hagen-Poiseuille ∝ flow, turbulent or orifice ∝ flow²",
             "lagging": "textbook: first-order lag of a regulator or a line, τ·dy/dt + y = x",
+            "volume": "the same of the muscle's volume πR²L in place of its stroke",
         },
         kinds={"level": "here full stroke is each level's own"},
         bends={"contraction": 3, "pace": 1},

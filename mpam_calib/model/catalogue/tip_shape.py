@@ -15,6 +15,7 @@ from mpam_calib.physics.kinematics import (
     tip_shortened_length,
     tip_shortened_length_of_its_own,
 )
+from mpam_calib.physics.statics import work_lost_at_tips
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -68,6 +69,13 @@ def _tapered(state: State, values: Values, setting: Setting) -> State:
     return replace(state, length=state.length - values["tip_factor"] * lost * (state.rest.L0 - state.length))
 
 
+def _volume(state: State, values: Values, setting: Setting) -> State:
+    """The muscle keeps its length, and the gas does no work on what its ends lack of the cylinder."""
+    shape = SHAPES[state.kinematics](np.maximum(state.length, 0.05 * state.rest.L0), state.rest)
+    loss = work_lost_at_tips(state.pressure, shape, state.rest)
+    return replace(state, lost=state.lost + values["tip_factor"] * loss)
+
+
 register(
     Effect(
         id="tip_shape",
@@ -79,12 +87,13 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"working": _working, "power": _power, "round": _round, "tapered": _tapered},
+        forms={"working": _working, "power": _power, "round": _round, "tapered": _tapered, "volume": _volume},
         own={"power": _exponent},
         sources={
             "working": "thesis Eq. 2.47 with the radius at L′ in place of that at L",
             "power": "textbook: sagitta of an arc over a fixed end, (R − R0)²; a cone of fixed slope, R − R0",
             "tapered": "conical ends: contraction times k (Tondu and Lopez 2000, doi:10.1109/37.833638)",
+            "volume": "textbook: virtual work −P dV/dL of a cylinder with conical ends",
             "round": "textbook: hemispherical or elliptical end caps, a length in proportion to R",
         },
         bends={"contraction": 4},
