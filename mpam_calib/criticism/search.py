@@ -138,10 +138,8 @@ class Search:
         # From where the best part ended, and from nothing: a part may have ended in a shape that only
         # made up for what it lacked.
         parts = self._from_parts(effects, size)
-        tries: list[Try] = []
-        for choice, start in parts:
-            forms = tuple(choice[e] for e in sorted(effects))
-            tries += [(forms, start), (forms, {})]
+        tries = [(tuple(choice[e] for e in sorted(effects)), start) for choice, start in parts]
+        tries.append((tries[0][0], {}))
         if len(effects) == 2:
             choice, _ = parts[0]
             # Alone, a cause may have taken another shape for want of its partner.

@@ -57,9 +57,9 @@ class Effect:
 
     Other authors' equations are forms, too: ``own`` are the parameters that a form has beside the effect's
     (such forms do not bend), ``leading`` how many of the effect's it makes use of, where not of all,
-    ``recalls`` the forms that have a memory though the effect has none, ``apart`` those that no bend stands
-    for, and ``sources`` where the forms' equations are from. A ``fault`` of an instrument is no cause to be
-    searched, named or declared, but a rival of all causes.
+    ``recalls`` the forms that have a memory and ``by_force`` those that need the force, though the effect
+    does not, ``apart`` those that no bend stands for, and ``sources`` where the forms' equations are from. A
+    ``fault`` of an instrument is no cause to be searched, named or declared, but a rival of all causes.
     """
 
     id: str
@@ -81,6 +81,7 @@ class Effect:
     own: Mapping[str, Parameters] = field(default_factory=dict)
     leading: Mapping[str, int] = field(default_factory=dict)
     recalls: tuple[str, ...] = ()
+    by_force: tuple[str, ...] = ()
     apart: tuple[str, ...] = ()
     sources: Mapping[str, str] = field(default_factory=dict)
     fault: bool = False
@@ -138,6 +139,7 @@ def formed(item: Effect, form: str) -> Effect:
         parameters=parameters,
         apply=item.forms[form],
         memory=item.memory or form in item.recalls,
+        uses_force=item.uses_force or form in item.by_force,
         source=item.sources.get(form, item.source),
     )
 

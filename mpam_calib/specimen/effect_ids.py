@@ -37,7 +37,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "wall_pressure": ("bent", "thick"),
     "length_offset": ("bent", "scale", "slip", "settling", "seating", "rezeroed"),
     "strand_friction": ("bent", "power", "contact"),
-    "coulomb_friction": ("bent", "constant", "capstan"),
+    "coulomb_friction": ("bent", "constant", "capstan", "power"),
     "rate_friction": (
         *("bent", "viscous", "viscous-bent", "power", "drag"),
         *("stroke", "stroke-power", "stroke-drag"),

@@ -12,7 +12,7 @@ import numpy as np
 
 from .chain import Form, State
 from .effects import shared_form
-from .muscle import KPA, Array, Geometry, radius_strands
+from .muscle import Array
 from .protocol import Rows
 
 
@@ -74,42 +74,6 @@ def _further_than_ever(rows: Rows) -> Array:
 
 def _lagging(rows: Rows) -> Array:
     return rows.level_fraction * rows.nominal_speed / rows.nominal_speed.max()
-
-
-def _filling(state: State, size: float) -> None:
-    """The supply holds back in proportion to the volume that it has filled, which it does with a lag."""
-    rows, g = state.rows, state.muscle.geometry
-    full = float(rows.displacement.max())
-
-    def volume(shortening: Array) -> Array:
-        length = g.L0_mm - shortening
-        return np.asarray(radius_strands(g, length) ** 2 * length)
-
-    rest, most = volume(np.zeros(1)), volume(np.full(1, full))
-    wanted = (volume(state.shortening) - rest) / (most - rest)
-    step = np.diff(rows.time, prepend=rows.time[0])
-    begun = np.diff(rows.level, prepend=rows.level[0]) != 0.0
-    lag = 0.08 * full / float(np.exp(np.mean(np.log(np.unique(rows.nominal_speed)))))
-    towards = -np.expm1(-step / lag)
-    filled = np.zeros(rows.count)
-    for i in range(1, rows.count):
-        before = 0.0 if begun[i] else filled[i - 1]
-        filled[i] = before + towards[i] * (wanted[i] - before)
-    state.pressure = state.pressure * (1.0 - 0.01 * size * filled)
-
-
-def _rounded_off(state: State, size: float) -> None:
-    """The gas does no work on what quarter-round ends lack of the cylinder's volume."""
-
-    def lacking(g: Geometry, length: Array) -> Array:
-        rise = radius_strands(g, length) - g.R0_mm
-        return np.asarray(2.0 * np.pi * (2.0 * g.R0_mm * rise**2 * (1.0 - np.pi / 4.0) + rise**3 / 3.0))
-
-    def lost(g: Geometry, length: Array, pressure: Array) -> Array:
-        slope = (lacking(g, length + 1e-4) - lacking(g, length - 1e-4)) / 2e-4
-        return np.asarray(2.0 * size * pressure * KPA * slope)
-
-    state.statics.append(lost)
 
 
 def _sliding_at_first(state: State, size: float) -> None:
@@ -189,9 +153,5 @@ CONVENTIONS: dict[str, Form] = {
         _by("own_stroke", "pressure_droop", _drooping(lambda rows: rows.level_fraction)),
         # A regulator that does not keep up: in proportion to the speed as well.
         _by("lagging", "pressure_droop", _drooping(_lagging)),
-        # A supply that has a volume to fill, and takes its time.
-        _by("filling", "pressure_droop", _filling),
-        # Ends that take no length but volume.
-        _by("rounded_off", "tip_shape", _rounded_off),
     )
 }

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from mpam_calib.model.curves import power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import HalfNormal, Normal, Parameter
+from mpam_calib.model.priors import HalfNormal, LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
 SCALE = 0.2
@@ -46,6 +47,16 @@ def _capstan(state: State, values: Values, setting: Setting) -> State:
     return replace(_apply(state, values, setting), tightening=state.tightening + lifted)
 
 
+def _power(state: State, values: Values, setting: Setting) -> State:
+    """A power of the force, as large at the force scale: contacts that spread under load."""
+    part = power(np.abs(state.guide) / setting.force_scale, values["force_exponent"] - 1.0)
+    return replace(state, coulomb=state.coulomb + values["K_f"] * part)
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("force_exponent", LogNormal(0.8, 0.3), "power of the force", "textbook", ""),)
+
+
 register(
     Effect(
         id="coulomb_friction",
@@ -60,10 +71,12 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"constant": _constant, "capstan": _capstan},
-        own={"constant": _share},
+        forms={"constant": _constant, "capstan": _capstan, "power": _power},
+        own={"constant": _share, "power": _exponent},
+        by_force=("power",),
         sources={
             "constant": "K|F| + a constant dry friction (Chou & Hannaford 1996)",
+            "power": "friction of fibres, a·N^n with n from 2/3 to 1 (Howell & Mazur 1953)",
             "capstan": "friction of a wound rope (Euler 1769; Eytelwein 1808): F·exp(±μ), K_f = sinh μ",
         },
         bends={"force": 1, "pressure": 2, "contraction": 1},
