@@ -59,6 +59,22 @@ def test_beside_two_others_a_cause_has_the_form_that_it_had_beside_one() -> None
     assert "creep_per_decade" in start and nothing == {}
 
 
+def test_a_larger_set_also_takes_the_forms_that_a_pair_has_beside_the_remainder_that_suits_it() -> None:
+    """Without a remainder a pair that still lacks a cause may have ended in forms far from its best ones."""
+    problem = problem_of(specimen_of("develop-null-001"))
+    pair, single = frozenset({"braid_angle", "tip_shape"}), frozenset({"force_drift"})
+    bare = fit(problem, frozenset({"braid_angle", "tip_shape:bent"}), 0)
+    held = fit(problem, frozenset({"braid_angle", "tip_shape:power"}), 2)
+    held = replace(held, log_evidence=bare.log_evidence + 50.0)
+    fits = {(pair, 0): bare, (pair, 2): held, (single, 0): fit(problem, single, 0)}
+    tested = ("braid_angle", "force_drift", "tip_shape")
+    found = Search(problem, tested, Alone(problem), fits=fits)
+    forms = [tried for tried, _ in found._tries(frozenset(tested), 0)]
+    alike, better = (("braid_angle", "force_drift", form) for form in ("tip_shape:bent", "tip_shape:power"))
+    assert forms == [alike, better, alike]
+    assert [tried for tried, _ in found._tries(frozenset(tested), 2)] == [better, better]
+
+
 def undoubted(found: Search) -> Search:
     """The search before the leading sets' forms were doubted."""
     return Search(found.problem, found.tested, found.spread, fits=dict(found.searched))

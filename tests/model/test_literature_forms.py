@@ -199,7 +199,13 @@ def test_a_form_starts_near_the_effect_s_own_equation(form: str) -> None:
 
 @pytest.mark.parametrize(
     "form",
-    ["length_offset:slip", "length_offset:settling", "pressure_droop:speed", "pressure_droop:lagging"],
+    [
+        "length_offset:slip",
+        "length_offset:settling",
+        "pressure_droop:speed",
+        "pressure_droop:lagging",
+        "pressure_droop:volume",
+    ],
 )
 def test_a_form_with_a_memory_says_so(form: str) -> None:
     assert effect(form).memory and not effect(form.partition(":")[0]).memory
@@ -273,6 +279,24 @@ def test_friction_at_any_force_is_chou_and_hannaford_s() -> None:
     state = effect("coulomb_friction:constant").apply(start(setting, rows(setting)), values, setting)
     np.testing.assert_allclose(state.coulomb, 0.0, atol=1e-15)
     np.testing.assert_allclose(state.drag, 0.1 * setting.force_scale)
+
+
+@pytest.mark.parametrize("exponent", [0.6, 1.0, 1.3])
+def test_friction_of_fibres_is_a_power_of_the_force(exponent: float) -> None:
+    """Howell's law, a·N^n: half the loop's width over half its height, at two places of the stroke."""
+    setting = setting_for("coulomb_friction:power")
+    values = {"f_s": np.zeros((1, 1)), "K_f": np.array([[1e-3]]), "force_exponent": np.array([[exponent]])}
+    for share in (0.2, 0.7):
+        down, up = (
+            float(
+                force(setting, values, middle(setting, displacement=share * setting.stroke, sign=sign))[0, 0]
+            )
+            for sign in (-1.0, 1.0)
+        )
+        free = 0.5 * (up + down)
+        width = 1e-3 * setting.force_scale * (free / setting.force_scale) ** exponent
+        assert 0.5 * (up - down) == pytest.approx(width, rel=0.01)
+    assert effect("coulomb_friction:power").uses_force and not effect("coulomb_friction").uses_force
 
 
 @pytest.mark.parametrize("s", [-1.0, 0.0, 1.0])
