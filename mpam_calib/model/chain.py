@@ -24,7 +24,7 @@ from mpam_calib.model.readings import Readings
 from mpam_calib.model.reference import rest_of
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.friction import coulomb_factor, strand_friction_per_f_s
-from mpam_calib.physics.kinematics import SHAPES, swollen
+from mpam_calib.physics.kinematics import SHAPES, SHORTEST, swollen
 from mpam_calib.physics.statics import gas_force, modulus_columns, thickness_force
 
 Array = NDArray[np.float64]
@@ -192,7 +192,7 @@ class Chain:
         state = self._stage(Stage.RIG, state, values)
         state = replace(state, length=state.rest.L0 - state.displacement)
         state = self._stage(Stage.SHAPE, state, values)
-        length = np.maximum(state.length, 0.05 * state.rest.L0)
+        length = np.maximum(state.length, SHORTEST * state.rest.L0)
         shape = swollen(SHAPES[state.kinematics](length, state.rest), state.rest, state.swell)
         return replace(state, shape=shape)
 

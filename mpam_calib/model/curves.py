@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from mpam_calib.model.state import Setting, State
-from mpam_calib.physics.kinematics import SHAPES, Shape
+from mpam_calib.physics.kinematics import SHAPES, SHORTEST, Shape
 
 Array = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ def middle_pressure(setting: Setting) -> float:
 
 def middle_shape(state: State, setting: Setting) -> Shape:
     """The muscle's shape at half the stroke."""
-    length = np.maximum(state.rest.L0 - 0.5 * setting.stroke, 0.05 * state.rest.L0)
+    length = np.maximum(state.rest.L0 - 0.5 * setting.stroke, SHORTEST * state.rest.L0)
     return SHAPES[state.kinematics](length, state.rest)
 
 

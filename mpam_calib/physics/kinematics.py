@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+SHORTEST = 0.05
+"""Shortest muscle whose shape is reckoned, as a share of its length at rest."""
 SIN_LIMIT = 1.0 - 1e-9
 """Strands cannot be stretched straight: beyond this sin α the geometry is held there."""
 
@@ -142,7 +144,7 @@ def tip_shortened_length_of_its_own(L: Array, kinematics: str, rest: Rest, facto
 
     Eq. 2.47 with the radius of Eq. 2.10 or 4.16 at L′ in place of that at L; by Newton's method.
     """
-    shape, least, step = SHAPES[kinematics], 0.05 * rest.L0, 1e-5 * rest.L0
+    shape, least, step = SHAPES[kinematics], SHORTEST * rest.L0, 1e-5 * rest.L0
     working = L
     for _ in range(NEWTON_STEPS):
         at = np.maximum(working, least)

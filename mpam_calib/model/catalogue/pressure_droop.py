@@ -11,14 +11,12 @@ from mpam_calib.model.curves import level_stroke, over_mean, power, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import HalfLongTailed, LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
-from mpam_calib.physics.kinematics import radius_inextensible_braid
+from mpam_calib.physics.kinematics import SHORTEST, radius_inextensible_braid
 
 Array = NDArray[np.float64]
 
 LAG_SHARE, NO_WAY = 0.1, 1e-12
 """A supply's typical lag over a stroke's time; a way (m) as good as none."""
-LEAST_LENGTH = 0.05
-"""Shortest muscle that has a volume, as a share of its length at rest."""
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -76,7 +74,7 @@ def _volume(state: State, values: Values, setting: Setting) -> State:
     """The same in proportion to the volume that the braid encloses and the supply has to fill."""
 
     def volume(shortening: Array) -> Array:
-        length = np.maximum(state.rest.L0 - shortening, LEAST_LENGTH * state.rest.L0)
+        length = np.maximum(state.rest.L0 - shortening, SHORTEST * state.rest.L0)
         return np.asarray(radius_inextensible_braid(length, state.rest) ** 2 * length)
 
     at_rest, full = volume(np.zeros((1, 1))), volume(np.full((1, 1), setting.stroke))

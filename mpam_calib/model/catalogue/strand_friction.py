@@ -11,7 +11,7 @@ from mpam_calib.model.curves import middle_pressure, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import HalfNormal, LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
-from mpam_calib.physics.kinematics import Rest, radius_inextensible_braid
+from mpam_calib.physics.kinematics import SHORTEST, Rest, radius_inextensible_braid
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def _exponent(setting: Setting) -> tuple[Parameter, ...]:
 
 def _spread(length: Array, rest: Rest) -> Array:
     """(R0/R)·(L0/L) of Eq. 2.43: how the pressed surface shrinks to the strands' contact."""
-    length = np.clip(length, 0.05 * rest.L0, None)
+    length = np.clip(length, SHORTEST * rest.L0, None)
     return rest.R0 / radius_inextensible_braid(length, rest) * rest.L0 / length
 
 

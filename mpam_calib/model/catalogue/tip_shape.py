@@ -12,6 +12,7 @@ from mpam_calib.model.priors import LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.kinematics import (
     SHAPES,
+    SHORTEST,
     tip_shortened_length,
     tip_shortened_length_of_its_own,
 )
@@ -71,7 +72,7 @@ def _tapered(state: State, values: Values, setting: Setting) -> State:
 
 def _volume(state: State, values: Values, setting: Setting) -> State:
     """The muscle keeps its length, and the gas does no work on what its ends lack of the cylinder."""
-    shape = SHAPES[state.kinematics](np.maximum(state.length, 0.05 * state.rest.L0), state.rest)
+    shape = SHAPES[state.kinematics](np.maximum(state.length, SHORTEST * state.rest.L0), state.rest)
     loss = work_lost_at_tips(state.pressure, shape, state.rest)
     return replace(state, lost=state.lost + values["tip_factor"] * loss)
 
