@@ -44,7 +44,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "presliding": (
         *("bent", "rest", "rest-bent", "masing", "masing-bent", "sliding", "sliding-bent"),
-        *("ramp", "ramp-bent", "dahl", "rest-dahl", "masing-dahl", "sliding-dahl"),
+        *("ramp", "ramp-bent", "power", "dahl", "rest-dahl", "masing-dahl", "sliding-dahl"),
     ),
     "stress_softening": (
         *("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),

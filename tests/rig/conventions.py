@@ -94,6 +94,12 @@ def _slipping_one_by_one(state: State, size: float) -> None:
     state.turn = state.turn * np.where(first, loaded, 2.0 * turned - 1.0)
 
 
+def _steep_at_once(state: State, size: float) -> None:
+    """A root of the travel up to full sliding: steep right after the turn."""
+    part = np.minimum(state.rows.since_reversal / max(2.6 * size, 1e-6), 1.0) ** 0.5
+    state.turn = state.turn * (2.0 * part - 1.0)
+
+
 def _by_the_stroke(state: State, size: float) -> None:
     """A power of the speed that the crosshead was set to, whatever it does at its turns."""
     speed = state.rows.nominal_speed
@@ -141,6 +147,8 @@ CONVENTIONS: dict[str, Form] = {
         _by("sliding_at_first", "presliding", _sliding_at_first),
         # Friction builds up from none on a level's first stroke: Maxwell's slip.
         _by("slipping_one_by_one", "presliding", _slipping_one_by_one),
+        # Friction turns over by a root of the travel.
+        _by("steep_at_once", "presliding", _steep_at_once),
         # Friction goes by the speed that the stroke was driven with, the gentle turns included.
         _by("by_the_stroke", "rate_friction", _by_the_stroke),
         # A level is reached some time before its first reading.

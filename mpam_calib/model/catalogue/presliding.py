@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mpam_calib.model.curves import STEEPEST
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -42,6 +43,16 @@ def _dahl(state: State, values: Values) -> Array:
     return np.asarray(np.exp(-np.minimum(left, 700.0)))
 
 
+def _power(state: State, values: Values) -> Array:
+    """A power of the travel up to full sliding: below 1 it rises steeply at once."""
+    turn = np.minimum(state.readings.travel / (WHOLE * values["reversal_mm"]), 1.0)
+    return np.asarray(1.0 - turn ** np.minimum(values["reversal_exponent"], STEEPEST))
+
+
+def _steepness(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("reversal_exponent", LogNormal(0.6, 0.3), "power of the travel", "Swevers 2000", ""),)
+
+
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("dahl_exponent", Normal(1.0, 0.4), "how the friction's slope fades", "Dahl 1976", ""),)
 
@@ -51,6 +62,8 @@ SAME, NONE_LEFT = 1e-6, 1e-15
 AGAINST, REST, SLIDING = 2.0, 1.0, 0.0
 """How far friction turns on a level's first stroke: from against it, since pressurising moved the muscle;
 from none; or not at all, since no reversal began the stroke."""
+WHOLE = 2.0
+"""Reversals in which a power of the travel turns friction over wholly: after one both equations agree."""
 MASING = 2.0
 """How much quicker friction builds up from none than it turns over: Masing's rule."""
 
@@ -83,6 +96,7 @@ register(
             "masing": _turning(_exponential, REST, MASING),
             "sliding": _turning(_exponential, SLIDING),
             "ramp": _turning(_ramp, AGAINST),
+            "power": _turning(_power, AGAINST),
             "dahl": _turning(_dahl, AGAINST),
             "rest-dahl": _turning(_dahl, REST),
             "masing-dahl": _turning(_dahl, REST, MASING),
@@ -94,11 +108,12 @@ register(
             "sliding": "here not on a level's first stroke",
             "ramp": "here in proportion to the travel",
         },
-        own=dict.fromkeys(DAHL, _exponent),
+        own=dict.fromkeys(DAHL, _exponent) | {"power": _steepness},
         sources=dict.fromkeys(
             DAHL,
             "Dahl 1976, exponent i after Bliman 1992; i = 1/2: Iwan 1966, Masing's rule with even slip",
-        ),
+        )
+        | {"power": "power law of the hysteresis curve (Swevers et al. 2000, IEEE Trans. Autom. Control 45)"},
         bends={"travel": 3},
         looseness=2.0,
     )
