@@ -57,7 +57,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "force_drift": (
         *("bent", "settling", "settling-bent", "tared", "tared-bent"),
-        *("early", "power", "thermal", "return"),
+        *("early", "power", "root", "thermal", "return"),
     ),
     "pressure_droop": ("bent", "level", "level-bent", "power", "level-power", "speed", "lagging", "volume"),
     "rig_compliance": ("bent", "power", "toe", "preload"),

@@ -48,7 +48,7 @@ def _before(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _power(state: State, values: Values, setting: Setting) -> State:
-    """A power of time, as far at half the test: a half with diffusion of heat, 2 ever faster."""
+    """A power of time, as far at half the test: 2 ever faster."""
     half = half_test(setting)
     path = half * signed_power(state.readings.time / half, values["drift_exponent"])
     return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
@@ -56,6 +56,13 @@ def _power(state: State, values: Values, setting: Setting) -> State:
 
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("drift_exponent", LogNormal(1.0, 0.5), "power of time", "textbook", ""),)
+
+
+def _root(state: State, values: Values, setting: Setting) -> State:
+    """The square root of time, as far at half the test: heat that is conducted into the cell."""
+    half = half_test(setting)
+    path = np.sqrt(half * np.maximum(state.readings.time, 0.0))
+    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
 
 
 def _thermal(state: State, values: Values, setting: Setting) -> State:
@@ -92,13 +99,15 @@ register(
             "tared": _tared,
             "early": _early,
             "power": _power,
+            "root": _root,
             "thermal": _thermal,
             "return": _return,
         },
         own={"early": _before, "power": _exponent, "thermal": _time},
         sources={
             "early": "the same line, from before the first reading",
-            "power": "textbook: square root of time (heat conduction), quadratic",
+            "power": "textbook: quadratic, or any other power",
+            "root": "textbook: heat conducted into a thick body, square root of time",
             "thermal": "textbook: Newton's law of cooling, 1 − exp(−t/τ)",
             "return": "textbook: half a period of a sine over the test",
         },
