@@ -22,6 +22,12 @@ def forms_of(identifier: str) -> tuple[str, ...]:
     return (identifier, *(f"{identifier}:{form}" for form in effect(identifier).all_forms))
 
 
+def equations_of(identifier: str) -> tuple[str, ...]:
+    """The forms of an effect that are not bent."""
+    bent = {f"{identifier}:{form}" for form in effect(identifier).bent_forms}
+    return tuple(form for form in forms_of(identifier) if form not in bent)
+
+
 def price(form: str) -> float:
     """Nats that one form costs: its share of the prior among the effect's forms."""
     identifier, _, name = form.partition(":")

@@ -13,7 +13,7 @@ from scipy import linalg
 
 from mpam_calib.criticism.doubt import DOUBTS
 from mpam_calib.criticism.fit import Fit, fit
-from mpam_calib.criticism.forms import forms_of, price
+from mpam_calib.criticism.forms import equations_of, forms_of, price
 from mpam_calib.criticism.spread import held_problem
 
 Set = frozenset[str]
@@ -49,6 +49,25 @@ def with_doubt(found: Fit) -> Fit:
     """The fit with a doubt about the forms of its effects; as it is where that cannot be climbed."""
     again = _better(None, tuple(sorted(found.effects)), found.size, ended(found), DOUBTS)
     return found if again is None else again
+
+
+def with_doubted_equations(found: Fit) -> Fit:
+    """:func:`with_doubt`, where a bent effect may follow the best of its equations instead.
+
+    At its word an equation that is a little off loses to a bend, which costs more than a doubt does.
+    """
+    best = with_doubt(found)
+    for e, form in named_forms(found).items():
+        equations = equations_of(e)
+        if form not in equations:
+            at_word: Fit | None = None
+            for equation in equations:
+                chosen = named_forms(best) | {e: equation}
+                at_word = _better(at_word, tuple(chosen.values()), found.size, ended(best))
+            doubted = None if at_word is None else with_doubt(at_word)
+            if doubted is not None and doubted.log_evidence > best.log_evidence:
+                best = doubted
+    return best
 
 
 def with_better_forms(found: Fit) -> Fit:

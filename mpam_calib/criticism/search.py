@@ -30,6 +30,7 @@ from mpam_calib.criticism.refits import (
     named_forms,
     with_better_forms,
     with_doubt,
+    with_doubted_equations,
 )
 from mpam_calib.criticism.screen import gain, promising
 from mpam_calib.criticism.spread import Alone, Spread
@@ -206,9 +207,15 @@ class Search:
         bases = [s for s in (frozenset[str](), sets[0]) if s in sets[:LEADERS]]
         chosen |= {further for base in bases for further in self.with_one_more(base)}
         keys = [key for key in self.fits if key[0] in chosen]
-        doubted = self.spread(with_doubt, [self.fits[key] for key in keys], chunk=2)
+        first = {(s, self.best_size(s)) for s in sets[:LEADERS]}
+        rest = [key for key in keys if key not in first]
+        leading = [key for key in keys if key in first]
+        doubted = [
+            *self.spread(with_doubted_equations, [self.fits[key] for key in leading]),
+            *self.spread(with_doubt, [self.fits[key] for key in rest], chunk=2),
+        ]
         # A doubt has its price in evidence: who does not pay it cannot be compared with those who do.
-        self.searched, self.fits = self.fits, dict(zip(keys, doubted, strict=True))
+        self.searched, self.fits = self.fits, dict(zip([*leading, *rest], doubted, strict=True))
         self.doubting = True
 
     def with_one_more(self, effects: Set) -> list[Set]:
