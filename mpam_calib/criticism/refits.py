@@ -51,23 +51,28 @@ def with_doubt(found: Fit) -> Fit:
     return found if again is None else again
 
 
-def with_doubted_equations(found: Fit) -> Fit:
-    """:func:`with_doubt`, where a bent effect may follow the best of its equations instead.
+def with_doubted_equations(task: tuple[Fit, bool]) -> Fit:
+    """:func:`with_doubt`, where a bent effect may follow its equation instead, or (``task`` says) others'.
 
     At its word an equation that is a little off loses to a bend, which costs more than a doubt does.
     """
+    found, others_too = task
     best = with_doubt(found)
     for e, form in named_forms(found).items():
-        equations = equations_of(e)
-        if form not in equations:
-            at_word: Fit | None = None
-            for equation in equations:
-                chosen = named_forms(best) | {e: equation}
-                at_word = _better(at_word, tuple(chosen.values()), found.size, ended(best))
-            doubted = None if at_word is None else with_doubt(at_word)
-            if doubted is not None and doubted.log_evidence > best.log_evidence:
-                best = doubted
+        own, *others = equations_of(e)
+        if form in (own, *others):
+            continue
+        at_word = [_better(None, _with(best, own), found.size, ended(best)), None]
+        for other in others if others_too else ():
+            at_word[1] = _better(at_word[1], _with(best, other), found.size, ended(best))
+        doubted = [with_doubt(equation) for equation in at_word if equation is not None]
+        best = max([best, *doubted], key=lambda f: f.log_evidence)
     return best
+
+
+def _with(found: Fit, form: str) -> tuple[str, ...]:
+    """The forms of a fit, but one of its effects in another form."""
+    return tuple((named_forms(found) | {form.partition(":")[0]: form}).values())
 
 
 def with_better_forms(found: Fit) -> Fit:
@@ -75,8 +80,7 @@ def with_better_forms(found: Fit) -> Fit:
     best = found
     for e in sorted(named_forms(found)):
         for form in forms_of(e):
-            chosen = named_forms(best) | {e: form}
-            best = _better(best, tuple(chosen.values()), found.size, ended(best)) or best
+            best = _better(best, _with(best, form), found.size, ended(best)) or best
     return best
 
 

@@ -207,15 +207,15 @@ class Search:
         bases = [s for s in (frozenset[str](), sets[0]) if s in sets[:LEADERS]]
         chosen |= {further for base in bases for further in self.with_one_more(base)}
         keys = [key for key in self.fits if key[0] in chosen]
-        first = {(s, self.best_size(s)) for s in sets[:LEADERS]}
-        rest = [key for key in keys if key not in first]
-        leading = [key for key in keys if key in first]
+        rest = [key for key in keys if key[1] != self.best_size(key[0])]
+        best = [key for key in keys if key[1] == self.best_size(key[0])]
+        tasks = [(self.fits[key], key[0] in sets[:LEADERS]) for key in best]
         doubted = [
-            *self.spread(with_doubted_equations, [self.fits[key] for key in leading]),
+            *self.spread(with_doubted_equations, tasks),
             *self.spread(with_doubt, [self.fits[key] for key in rest], chunk=2),
         ]
         # A doubt has its price in evidence: who does not pay it cannot be compared with those who do.
-        self.searched, self.fits = self.fits, dict(zip([*leading, *rest], doubted, strict=True))
+        self.searched, self.fits = self.fits, dict(zip([*best, *rest], doubted, strict=True))
         self.doubting = True
 
     def with_one_more(self, effects: Set) -> list[Set]:
