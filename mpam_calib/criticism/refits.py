@@ -60,13 +60,18 @@ def with_doubted_equations(task: tuple[Fit, bool]) -> Fit:
     best = with_doubt(found)
     for e, form in named_forms(found).items():
         own, *others = equations_of(e)
-        if form in (own, *others):
-            continue
-        at_word = [_better(None, _with(best, own), found.size, ended(best)), None]
-        for other in others if others_too else ():
-            at_word[1] = _better(at_word[1], _with(best, other), found.size, ended(best))
-        doubted = [with_doubt(equation) for equation in at_word if equation is not None]
-        best = max([best, *doubted], key=lambda f: f.log_evidence)
+        if form not in (own, *others):
+            at_word = [_best_with(best, [own]), _best_with(best, others if others_too else [])]
+            doubted = [with_doubt(equation) for equation in at_word if equation is not None]
+            best = max([best, *doubted], key=lambda f: f.log_evidence)
+    return best
+
+
+def _best_with(found: Fit, forms: list[str]) -> Fit | None:
+    """The best fit in which one effect has one of these forms instead, at its word."""
+    best: Fit | None = None
+    for form in forms:
+        best = _better(best, _with(found, form), found.size, ended(found))
     return best
 
 

@@ -13,9 +13,10 @@ from rig.effects import shared_form
 from rig.recipes import Recipe, Wanted, build_case
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.fit import fit
+from mpam_calib.criticism.climb import Climb
+from mpam_calib.criticism.fit import chain_for, doubt_on_rows, fit
 from mpam_calib.criticism.forms import flexible, forms_of, price
-from mpam_calib.criticism.refits import with_better_forms
+from mpam_calib.criticism.refits import best_of, with_better_forms, with_doubt, with_doubted_equations
 from mpam_calib.criticism.search import NEAR, POLISHED, Search, search
 from mpam_calib.criticism.spread import Alone, spread_over
 from mpam_calib.model.effect import effect, known_effects
@@ -73,6 +74,31 @@ def test_a_larger_set_also_takes_the_forms_that_a_pair_has_beside_the_remainder_
     alike, better = (("braid_angle", "force_drift", form) for form in ("tip_shape:bent", "tip_shape:power"))
     assert forms == [alike, better, alike]
     assert [tried for tried, _ in found._tries(frozenset(tested), 2)] == [better, better]
+
+
+@pytest.mark.parametrize("identifier", ["length_offset", "wall_pressure"])
+def test_an_equation_that_is_a_little_off_is_not_left_to_a_bend(identifier: str) -> None:
+    """A cause whose equation is wrong by some per cent, smoothly: a bend fits better, and says less."""
+    problem = problem_of(specimen_of("develop-null-001"))
+    key, effects = problem.blueprint.model_dump_json(), frozenset({identifier})
+    base = fit(problem, frozenset(), 0)
+    climb = Climb(problem, chain_for(key, effects), 0, np.empty((len(problem), 0)))
+    u = np.array([dict(zip(base.names, base.u, strict=True)).get(name, 2.0) for name in climb.names])
+    values, guide = climb.values(u[None]), climb.guide()
+    off = doubt_on_rows(problem, key, effects, values, base.eta, guide)
+    true = climb.chain.force(values, base.eta[None], problem.middle())[0]
+    true = true + 0.03 * off @ np.random.default_rng(1).normal(size=off.shape[1])
+    made = problem.with_force(true + problem.force - base.force)
+    with spread_over(made, 1) as spread:
+        tasks = [(0, [((form,), {})], False) for form in (f"{identifier}:bent", identifier)]
+        bent, equation = (found for found in spread(best_of, tasks) if found is not None)
+        doubted_bend, doubted = spread(with_doubt, [bent, equation])
+        assert bent.log_evidence > equation.log_evidence
+        assert doubted.log_evidence > doubted_bend.log_evidence + 5.0
+        (chosen, among_all) = spread(with_doubted_equations, [(bent, False), (bent, True)])
+    assert chosen.effects == effects
+    assert chosen.log_evidence == pytest.approx(doubted.log_evidence, abs=0.5)
+    assert among_all.log_evidence >= chosen.log_evidence
 
 
 def undoubted(found: Search) -> Search:
