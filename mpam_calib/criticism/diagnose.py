@@ -159,10 +159,8 @@ def _cause(diagnosis: Diagnosis, identifier: str, seed: int) -> dict[str, Any]:
     within = False
     declared = {"braid_angle": setting.geometry.sd.alpha0, "dead_band": setting.pressure_bias_sd}
     for number, parameter in enumerate(effect(written).parameters(setting)):
-        i = fitted.names.index(parameter.name)
         rng = np.random.default_rng([seed, 9, number])
-        u = fitted.u[i] + np.sqrt(fitted.covariance[i, i]) * rng.standard_normal(DRAWS)
-        values = parameter.prior.from_normal(u)
+        values = parameter.prior.from_normal(fitted.draw(parameter.name, DRAWS, rng))
         factor = si_factor(parameter.name)
         q05, q95 = np.quantile(values, [0.05, 0.95]) / factor
         parameters[parameter.name] = {

@@ -26,12 +26,22 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class Under:
+    """What one doubt makes of the coordinates: its log evidence (nats), their mode (d,) and sds (d,)."""
+
+    log_evidence: float
+    u: Array
+    sd: Array
+
+
+@dataclass(frozen=True)
 class Fit:
     """A refitted hypothesis: its effects, the remainder's size, coordinates and how good it is.
 
     ``u`` (d,), ``eta`` (p,) and the doubt's ``zeta`` (r,) at the mode with covariance (d + p + r, d + p + r);
     ``force`` (n,) the model's and ``doubt`` (n,) what the doubt adds, N; ``log_evidence`` in nats, summed
     over the doubts in play, of which ``doubt_sd`` is the likeliest; ``chi2`` the whitened sum of squares.
+    ``under`` has the coordinates by every doubt in play.
     """
 
     effects: frozenset[str]
@@ -46,6 +56,20 @@ class Fit:
     doubt_sd: float
     log_evidence: float
     chi2: float
+    under: tuple[Under, ...]
+
+    def draw(self, name: str, count: int, rng: np.random.Generator) -> Array:
+        """Draws (count,) of one coordinate, every doubt in play by its probability.
+
+        The likeliest doubt alone would be too sure: it may be none where a small one is nearly as likely.
+        """
+        i = self.names.index(name)
+        log_evidence = np.array([d.log_evidence for d in self.under])
+        mode = np.array([d.u[i] for d in self.under])
+        sd = np.array([d.sd[i] for d in self.under])
+        weights = np.exp(log_evidence - np.logaddexp.reduce(log_evidence))
+        which = rng.choice(len(weights), size=count, p=weights / weights.sum())
+        return np.asarray(mode[which] + sd[which] * rng.standard_normal(count))
 
 
 def extended(blueprint: Blueprint, effects: frozenset[str]) -> Blueprint:
@@ -113,7 +137,8 @@ def fit(
         place = climb.climb(place.u, place.guide, place.eta[: chain.linear_size])
         found.append(_fitted(effects, climb, place, doubt))
     evidence = np.logaddexp.reduce([f.log_evidence for f in found]) - np.log(len(found))
-    return replace(max(found, key=lambda f: f.log_evidence), log_evidence=float(evidence))
+    under = tuple(d for f in found for d in f.under)
+    return replace(max(found, key=lambda f: f.log_evidence), log_evidence=float(evidence), under=under)
 
 
 def _fitted(effects: frozenset[str], climb: Climb, place: Place, doubt: float) -> Fit:
@@ -127,6 +152,9 @@ def _fitted(effects: frozenset[str], climb: Climb, place: Place, doubt: float) -
     factor = linalg.cho_factor(hessian, lower=True)
     log_det = 2.0 * float(np.sum(np.log(np.diagonal(factor[0]))))
     constant = problem.log_dets[climb.size] + len(problem) * np.log(2.0 * np.pi)
+    log_evidence = float(place.objective - 0.5 * (constant + log_det))
+    covariance = np.asarray(linalg.cho_solve(factor, np.eye(len(hessian))))
+    sd = np.sqrt(np.diagonal(covariance)[: len(place.u)])
     return Fit(
         effects=effects,
         size=climb.size,
@@ -134,10 +162,11 @@ def _fitted(effects: frozenset[str], climb: Climb, place: Place, doubt: float) -
         u=place.u,
         eta=eta,
         zeta=zeta,
-        covariance=np.asarray(linalg.cho_solve(factor, np.eye(len(hessian)))),
+        covariance=covariance,
         force=place.force,
         doubt=climb.extra @ zeta,
         doubt_sd=doubt,
-        log_evidence=float(place.objective - 0.5 * (constant + log_det)),
+        log_evidence=log_evidence,
         chi2=float(place.residual @ place.residual),
+        under=(Under(log_evidence, place.u, sd),),
     )

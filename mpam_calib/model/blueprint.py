@@ -23,6 +23,10 @@ STILL_SHARE = 0.01
 """A stroke shorter than this share of the longest is a hold."""
 DWELL_SHARE = 0.005
 """Where so much of its way is left, a crosshead that dwells at the ends is still under way."""
+ENOUGH = 8
+"""Rows that tell how a crosshead gathers its speed."""
+RAMPS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
+"""Shares of a stroke's time in which it may do so."""
 PULL_SHARE = 0.02
 """A muscle that shows this share of its greatest force pulls."""
 
@@ -187,19 +191,45 @@ def _stroke_time(loops: Loops) -> float:
 
 
 def _speed(loops: Loops) -> float:
-    """Geometric mean of the speeds of the strokes that move, m/s; the thesis's where none does.
-
-    A stroke's speed is its way over the time that it takes, less what it dwells at its ends.
-    """
+    """Geometric mean of the strokes' mean speeds, m/s, of those that move; the thesis's where none does."""
     x = pd.Series(loops.displacement_m)
-    low, high = (x.groupby(loops.stroke).transform(f) for f in ("min", "max"))
+    low, high = (x.groupby(loops.stroke).transform(f).to_numpy() for f in ("min", "max"))
     way = high - low
-    under_way = (x > low + DWELL_SHARE * way) & (x < high - DWELL_SHARE * way)
-    rows = pd.DataFrame({"x": x, "t": loops.time_s})[under_way & (way > STILL_SHARE * way.max())]
-    strokes = rows.groupby(loops.stroke[rows.index])
-    spans = strokes.max() - strokes.min()
-    spans = spans[spans["t"] > 0.0]
-    return float(np.exp(np.mean(np.log(spans["x"] / spans["t"])))) if len(spans) else 50.0 * MM / MINUTE
+    share = (loops.displacement_m - low) / np.where(way > 0.0, way, 1.0)
+    under_way = (np.abs(share - 0.5) < 0.5 - DWELL_SHARE) & (way > STILL_SHARE * way.max())
+    _, stroke = np.unique(loops.stroke[under_way], return_inverse=True)
+    times = _times_under_way(share[under_way], loops.time_s[under_way], stroke)
+    ways = np.zeros(len(times))
+    ways[stroke] = way[under_way]
+    moved = times > 0.0
+    return float(np.exp(np.mean(np.log(ways[moved] / times[moved])))) if moved.any() else 50.0 * MM / MINUTE
+
+
+def _times_under_way(share: Array, time: Array, stroke: NDArray[np.intp]) -> Array:
+    """How long (strokes,) a crosshead takes from end to end, s, by what it does between; 0 where unknown.
+
+    ``share`` (rows,) is the part of its stroke's way. The time is linear in the one of the profiles that fits
+    best: speed gathered and lost over RAMPS of the time, or a sine.
+    """
+    rows = np.bincount(stroke)
+    since = time - (np.bincount(stroke, time) / rows)[stroke]
+    passed = [_passed(share, ramp) for ramp in RAMPS] + [np.arccos(1.0 - 2.0 * share) / np.pi]
+    slopes, left = [], []
+    for t in passed:
+        t = t - (np.bincount(stroke, t) / rows)[stroke]
+        slope = np.bincount(stroke, t * since) / np.maximum(np.bincount(stroke, t**2), 1e-12)
+        slopes.append(np.abs(slope))
+        left.append(np.bincount(stroke, (since - slope[stroke] * t) ** 2))
+    best = np.argmin(left, axis=0)
+    return np.where(rows >= ENOUGH, np.array(slopes)[best, np.arange(len(rows))], slopes[0])
+
+
+def _passed(share: Array, ramp: float) -> Array:
+    """Share of the time that a share (rows,) of the way takes, with speed gathered and lost evenly."""
+    near = np.minimum(share, 1.0 - share)
+    early = np.sqrt(2.0 * near * ramp * (1.0 - ramp))
+    passed = np.where(2.0 * near * (1.0 - ramp) < ramp, early, near * (1.0 - ramp) + 0.5 * ramp)
+    return np.where(share < 0.5, passed, 1.0 - passed)
 
 
 def _level_time(loops: Loops) -> float:

@@ -24,6 +24,7 @@ from rig import margins, recipes, sets
 from rig.effects import form as rig_form
 
 from mpam_calib.criticism.candidates import candidates
+from mpam_calib.criticism.diagnose import DRAWS
 from mpam_calib.criticism.problem import build_problem
 from mpam_calib.criticism.search import Search, search
 from mpam_calib.criticism.verdict import judge
@@ -71,9 +72,8 @@ def _inside(search: Search, effects: frozenset[str], one: rig_case.Case) -> tupl
         form = rig_form(hidden.id, hidden.form)
         if not form.shared or form.parameter not in priors:
             continue
-        i = fitted.names.index(form.parameter)
-        half = 1.645 * float(np.sqrt(fitted.covariance[i, i]))
-        low, high = priors[form.parameter].from_normal(fitted.u[i] + np.array([-half, half]))
+        u = fitted.draw(form.parameter, DRAWS, np.random.default_rng(one.seed))
+        low, high = np.quantile(priors[form.parameter].from_normal(u), [0.05, 0.95])
         of += 1
         hits += bool(low <= hidden.size * si_factor(form.parameter) <= high)
     return hits, of

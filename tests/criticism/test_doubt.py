@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.doubt import DOUBTS
-from mpam_calib.criticism.fit import Fit, chain_for, doubt_columns, fit
+from mpam_calib.criticism.fit import Fit, Under, chain_for, doubt_columns, fit
 from mpam_calib.criticism.problem import Problem
 
 DOUBT = max(DOUBTS)
 CAUSE, SIZE = "length_offset", 0.3
 """The hidden cause and its size in prior sds."""
 PASSENGER = "braid_angle"
+EACH = 60
+"""Tests made for every doubt."""
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +75,45 @@ def test_where_the_form_holds_nothing_is_doubted_away(problem: Problem) -> None:
     found = fit(made, frozenset([CAUSE]), 0, {"offset_mm": SIZE}, doubts=DOUBTS)
     assert found.doubt_sd == 0.0 and not found.doubt.any()
     assert found.u[found.names.index("offset_mm")] == pytest.approx(SIZE, abs=0.1 * SIZE)
+
+
+def test_draws_weigh_the_doubts_by_their_evidence(problem: Problem) -> None:
+    """Three to one for the second of two: three of four draws are its own, with its mode and sd."""
+    found = fit(problem, frozenset([CAUSE]), 0)
+    i, d = found.names.index("offset_mm"), len(found.names)
+    one = Under(-900.0, np.zeros(d), np.full(d, 0.5))
+    other = Under(-900.0 + np.log(3.0), np.full(d, 8.0), np.full(d, 0.1))
+    draws = replace(found, under=(one, other)).draw("offset_mm", 40_000, np.random.default_rng(3))
+    far = draws > 4.0
+    assert far.mean() == pytest.approx(0.75, abs=0.01)
+    assert (draws[far].mean(), draws[far].std()) == pytest.approx((8.0, 0.1), rel=0.02)
+    assert draws[~far].std() == pytest.approx(0.5, rel=0.03)
+    assert [d.u[i] for d in found.under] == [found.u[i]]
+
+
+def test_the_band_of_a_size_covers_whatever_doubt_was_due(problem: Problem) -> None:
+    """Forms off by each doubt in turn, as the doubt has it: 90 % bands hold the size in nine of ten."""
+    start = fit(problem, frozenset(), 0)
+    readings, first, second = problem.lean
+    key = problem.blueprint.model_dump_json()
+    chain = chain_for(key, frozenset([CAUSE]))
+    at = dict(zip(start.names, start.u, strict=True))
+    values = {p.name: p.prior.from_normal(np.full((1, 1), at.get(p.name, SIZE))) for p in chain.parameters}
+    guide = np.full(len(readings), float(problem.force.mean()))
+    columns = doubt_columns(key, frozenset([CAUSE]), values, start.eta, readings, guide)
+    off = 0.5 * (columns[first] + columns[second])
+    rng = np.random.default_rng(8)
+    inside = np.zeros(len(DOUBTS), dtype=int)
+    for i in range(len(DOUBTS) * EACH):
+        wrong = DOUBTS[i % len(DOUBTS)] * off @ rng.standard_normal(off.shape[1])
+        noise = rng.multivariate_normal(np.zeros(len(problem)), problem.covariance(0.0), method="cholesky")
+        made = problem.with_force(start.force + share(problem) + wrong + noise)
+        found = fit(made, frozenset([CAUSE]), 0, {"offset_mm": SIZE}, doubts=DOUBTS)
+        low, high = np.quantile(found.draw("offset_mm", 4000, rng), [0.05, 0.95])
+        inside[i % len(DOUBTS)] += low <= SIZE <= high
+    spread = np.sqrt(0.9 * 0.1 / EACH)
+    assert inside.mean() / EACH == pytest.approx(0.9, abs=3.0 * spread / np.sqrt(len(DOUBTS)))
+    assert (inside / EACH > 0.9 - 3.0 * spread).all()
 
 
 def test_a_second_cause_of_its_own_keeps_its_lead(problem: Problem) -> None:

@@ -196,12 +196,26 @@ def test_a_stroke_without_motion_keeps_its_bins():
 
 
 @pytest.mark.parametrize("dwell", [0.0, 2.0, 30.0])
-def test_a_dwell_does_not_slow_a_stroke_down(dwell):
-    """The mean speed without the last half per cent of the way at either end, which takes 4.5 % each."""
-    made, _ = gentle(60, dwell=dwell)
+@pytest.mark.parametrize("rows", [20, 60, 400])
+def test_a_dwell_does_not_slow_a_stroke_down(rows, dwell):
+    """The mean speed of a cosine is its way over the time from end to end, whatever it dwells there."""
+    made, _ = gentle(rows, dwell=dwell)
     blueprint = draw_blueprint(build.specimen({"law": "linear", "order": 2}, made), build.PLAIN)
-    share = 1.0 - 2.0 * np.arccos(1.0 - 2.0 * 0.005) / np.pi
-    assert blueprint.setting().speed == pytest.approx(0.99 / share * STROKE / HALF, rel=0.03)
+    assert blueprint.setting().speed == pytest.approx(STROKE / HALF, rel=0.02)
+
+
+@pytest.mark.parametrize("ramp", [0.0, 0.1, 0.25])
+def test_the_mean_speed_of_a_stroke_that_begins_and_ends_in_a_ramp(ramp):
+    """A share ``ramp`` of the time to gather speed and to lose it, with an encoder's noise of 0.03 %."""
+    made, _ = gentle(200, dwell=2.0, seed=5)
+    s = np.minimum((made.time_s - made.time_s[made.stroke == 1][0] * made.stroke) / HALF, 1.0)
+    way = np.where(s < ramp, s**2 / (2.0 * ramp or 1.0), s - 0.5 * ramp)
+    way = np.where(s > 1.0 - ramp, 1.0 - ramp - (1.0 - s) ** 2 / (2.0 * ramp or 1.0), way) / (1.0 - ramp)
+    x = STROKE * np.where(made.stroke % 2 == 0, way, 1.0 - way)
+    noisy = x + 3e-4 * STROKE * np.random.default_rng(2).standard_normal(len(x))
+    made = replace(made, displacement_m=noisy)
+    blueprint = draw_blueprint(build.specimen({"law": "linear", "order": 2}, made), build.PLAIN)
+    assert blueprint.setting().speed == pytest.approx(STROKE / HALF, rel=0.02)
 
 
 def test_a_stroke_knows_what_was_stretched_before():
