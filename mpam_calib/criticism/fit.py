@@ -104,6 +104,18 @@ def doubt_on_rows(
     return 0.5 * (columns[first] + columns[second])
 
 
+def doubt_about(problem: Problem, key: str, found: Fit) -> Array:
+    """What the forms of a fit may get wrong: columns (n, r), N, at its mode, with coefficients N(0, 1)."""
+    if found.doubt_sd == 0.0:
+        return np.empty((len(problem), 0))
+    chain, readings = chain_for(key, found.effects), problem.lean[0]
+    values = {p.name: p.prior.from_normal(found.u[None, i : i + 1]) for i, p in enumerate(chain.parameters)}
+    values = values or {"": np.zeros((1, 1))}
+    force = chain.force(values, found.eta[None], readings)
+    guide = np.broadcast_to(force, (1, len(readings)))[0]
+    return found.doubt_sd * doubt_on_rows(problem, key, found.effects, values, found.eta, guide)
+
+
 def fit(
     problem: Problem,
     effects: frozenset[str],

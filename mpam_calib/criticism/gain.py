@@ -18,7 +18,7 @@ from scipy import linalg
 from mpam_calib.criticism.budget import beyond_noise
 from mpam_calib.criticism.candidates import HISTORY
 from mpam_calib.criticism.climb import STEP
-from mpam_calib.criticism.fit import Fit, chain_for, doubt_columns
+from mpam_calib.criticism.fit import Fit, chain_for, doubt_about
 from mpam_calib.criticism.journal import Journal
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.refits import Set, causes_of
@@ -207,14 +207,10 @@ def linearise(problem: Problem, fitted: Fit, blueprint: Blueprint | None = None)
     force = np.broadcast_to(chain.force(values, eta, problem.readings), (len(points), 2 * n))
     mean = 0.5 * (force[:, :n] + force[:, n:])
     one = {name: v[:1] for name, v in values.items()}
-    guide = force[0]
     columns = np.broadcast_to(
-        chain.terms(one, problem.readings, guide).columns, (1, 2 * n, chain.linear_size)
+        chain.terms(one, problem.readings, force[0]).columns, (1, 2 * n, chain.linear_size)
     )[0]
     X = 0.5 * (columns[:n] + columns[n:])
     J = np.concatenate([(mean[1:] - mean[0]).T / STEP, X], axis=1)
-    if not len(fitted.zeta):
-        return mean[0], J
-    columns = fitted.doubt_sd * doubt_columns(key, fitted.effects, one, fitted.eta, problem.readings, guide)
-    D = 0.5 * (columns[:n] + columns[n:])
+    D = doubt_about(problem, key, fitted)
     return mean[0] + D @ fitted.zeta, np.concatenate([J, D], axis=1)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import integrate, interpolate, linalg
 
 from mpam_calib.criticism.climb import Climb, Place, furthest_of
-from mpam_calib.criticism.fit import Fit, chain_for, doubt_on_rows
+from mpam_calib.criticism.fit import Fit, chain_for, doubt_about
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.refits import ended, named_forms
 from mpam_calib.criticism.spread import Alone, Spread, held_problem
@@ -53,7 +53,7 @@ def hidden_sizes(
         for kind in (e, *(f"{e}:{name}" for name in effect(e).kinds))
         if len(effect(kind).parameters(setting)) == 1
     ]
-    doubt = _doubt(problem, named)
+    doubt = doubt_about(problem, problem.blueprint.model_dump_json(), named)
     tasks = [(named, doubt, kind) for kind in kinds]
     found: dict[str, list[tuple[float, Band]]] = {}
     for kind, band in zip(kinds, (spread or Alone(problem))(_band, tasks), strict=True):
@@ -71,17 +71,6 @@ def _beside(problem: Problem, named: Fit, doubt: Array, further: frozenset[str] 
     """A climb of the causes named and further ones, beside a doubt about the former (n, r), N."""
     chain = chain_for(problem.blueprint.model_dump_json(), named.effects | further)
     return Climb(problem, chain, 0, doubt)
-
-
-def _doubt(problem: Problem, named: Fit) -> Array:
-    """What the forms of the causes named may get wrong: columns (n, r), N, with coefficients N(0, 1)."""
-    none = np.empty((len(problem), 0))
-    if named.doubt_sd == 0.0:
-        return none
-    climb, key = _beside(problem, named, none), problem.blueprint.model_dump_json()
-    values = climb.values(named.u[None])
-    guide = climb.chain.force(values, named.eta[None], problem.lean[0])[0]
-    return named.doubt_sd * doubt_on_rows(problem, key, named.effects, values, named.eta, guide)
 
 
 def _band(task: tuple[Fit, Array, str]) -> tuple[float, Band] | None:
