@@ -44,6 +44,17 @@ def normalised_simulation(source: TomlSource, declaration: Declaration) -> Simul
     return simulation.model_copy(update=fixed)
 
 
+def unused(source: TomlSource, declaration: Declaration, used: Simulation) -> tuple[str, ...]:
+    """Remarks on keys of [simulation] that are declared, and that its moduli overrule."""
+    stated = source.tables.get("simulation", {})
+    return tuple(
+        f"simulation: {name} = {json.dumps(getattr(declaration.simulation, name))} is not used: "
+        f"the moduli make it {json.dumps(getattr(used, name))}"
+        for name in ("order", "law", "strain", "friction")
+        if name in stated and getattr(declaration.simulation, name) != getattr(used, name)
+    )
+
+
 def check_parts(source: TomlSource, declaration: Declaration, *, data_required: bool) -> None:
     """Refuse a declaration without data, or muscle data without a geometry."""
     simulation = declaration.simulation

@@ -15,6 +15,7 @@ from mpam_calib.specimen.consistency import (
     least_parameters,
     material_run,
     normalised_simulation,
+    unused,
 )
 from mpam_calib.specimen.declaration import Declaration, FileKind
 from mpam_calib.specimen.levels import medians_by_label, merge_levels, static_levels
@@ -94,7 +95,7 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
         free_contraction=free,
         tensile=tensile,
         digest=_digest(source, declaration, files),
-        notes=loops.notes if loops else (),
+        notes=(*(loops.notes if loops else ()), *unused(source, declaration, simulation)),
         files=tuple(
             FileRead(file.kind, file.name, count, file.form.delimiter, file.form.decimal)
             for kind, counts in rows.items()

@@ -97,3 +97,24 @@ def test_a_tensile_test_in_megapascals(scale: float, odd: bool, tmp_path: Path) 
     rows = "".join(f"{0.1 * k:.3g},{5e3 * k * scale:.6g}\n" for k in range(12))
     (folder / "tensile.csv").write_text("strain,stress_Pa\n" + rows)
     assert ("is it in pascals?" in " ".join(oddities(read(folder)))) == odd
+
+
+@pytest.mark.parametrize(
+    ("simulation", "said"),
+    [
+        (
+            'moduli = "tensile"\norder = 4\nE_Pa = [4.0e4, 2.6e4]',
+            "order = 4 is not used: the moduli make",
+        ),
+        ('moduli = "tensile"\nlaw = "linear"\nE_Pa = [4.0e4]', 'law = "linear" is not used'),
+        ('moduli = "tensile"\norder = 2\nE_Pa = [4.0e4, 2.6e4]', ""),
+        ('moduli = "tensile"\nE_Pa = [4.0e4, 2.6e4]', ""),
+        ("order = 3", ""),
+    ],
+)
+def test_what_declared_moduli_overrule_is_said(tmp_path: Path, simulation: str, said: str) -> None:
+    """Declared moduli fix the order, the law and the strain: what is declared beside them is not used."""
+    text = DECLARATION.replace('order = 2\nlaw = "linear"', simulation)
+    found = " ".join(oddities(read(make(tmp_path, text, loops=loops().text()))))
+    assert said in found
+    assert ("is not used" in found) == bool(said)
