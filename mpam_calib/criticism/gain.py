@@ -22,7 +22,7 @@ from mpam_calib.criticism.fit import Fit, chain_for, doubt_about
 from mpam_calib.criticism.journal import Journal
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.refits import Set, causes_of
-from mpam_calib.criticism.search import Search, search
+from mpam_calib.criticism.search import search
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.model.blueprint import Blueprint
 
@@ -126,12 +126,11 @@ def _fold(
     chosen = judge(found).standing
     found.refit_all((chosen, size) for size in range(len(SIZES)))
     index = (np.flatnonzero(~held), np.flatnonzero(held))
-    results = [_predict(problem, found, effects, index) for effects in (frozenset(), chosen)]
-    # A search that kept other sets may know these causes in the wrong forms alone.
-    found.refit_like(named)
-    causes = causes_of(named)
-    kept = causes if causes in found.sets else chosen  # no climb may have an end without these rows
-    results.append(_predict(problem, found, kept, index))
+    chosen_fits = [found.fits[e, found.best_size(e)] for e in (frozenset[str](), chosen)]
+    # In the forms of all rows: those that tell them apart may be the very rows held out. No climb may have
+    # an end without these rows.
+    fits = [*chosen_fits, found.refit_like(named) or chosen_fits[-1]]
+    results = [predict_rows(problem, fitted, index) for fitted in fits]
     residuals = [problem.force[held] - mean for mean, _ in results]
     covariances = [covariance for _, covariance in results]
     return _Fold(
@@ -150,13 +149,6 @@ def log_density(residual: Array, covariance: Array) -> float:
     log_det = 2.0 * float(np.sum(np.log(np.diagonal(factor[0]))))
     square = float(residual @ linalg.cho_solve(factor, residual))
     return -0.5 * (square + log_det + len(residual) * float(np.log(2.0 * np.pi)))
-
-
-def _predict(
-    problem: Problem, found: Search, effects: Set, index: tuple[NDArray[np.intp], NDArray[np.intp]]
-) -> tuple[Array, Array]:
-    """Mean (h,) and covariance (h, h) of held-out readings: parameters, remainder and noise."""
-    return predict_rows(problem, found.fits[effects, found.best_size(effects)], index)
 
 
 def predict_rows(

@@ -25,7 +25,6 @@ from mpam_calib.criticism.refits import (
     Set,
     Try,
     best_of,
-    causes_of,
     ended,
     named_forms,
     with_better_forms,
@@ -114,15 +113,12 @@ class Search:
             if found is not None:
                 self.fits[key] = found
 
-    def refit_like(self, known: Fit) -> None:
-        """Refit a set beside every remainder in the forms, and from the end, of another fit of it, too."""
-        effects = causes_of(known)
+    def refit_like(self, known: Fit) -> Fit | None:
+        """The best refit in the forms of another fit, and from where that ended; None where no climb ends."""
         tries = [(tuple(sorted(known.effects)), ended(known))]
-        for size in range(len(SIZES)):
-            (found,) = self.spread(best_of, [(size, tries, self.doubting)])
-            seen = self.fits.get((effects, size))
-            if found is not None and (seen is None or found.log_evidence > seen.log_evidence):
-                self.fits[effects, size] = found
+        tasks = [(size, tries, self.doubting) for size in range(len(SIZES))]
+        fits = [f for f in self.spread(best_of, tasks) if f is not None]
+        return max(fits, key=lambda f: f.log_evidence + log(SIZE_PRIOR[f.size]), default=None)
 
     def _tries(self, effects: Set, size: int) -> list[Try]:
         """Forms and starts of a set's climbs."""

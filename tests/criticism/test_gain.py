@@ -46,7 +46,7 @@ def test_bands_hold_a_misfit_that_no_remainder_holds(null_problem: Problem, shar
 
 
 def test_named_causes_are_refitted_in_the_forms_that_were_named(null_problem: Problem) -> None:
-    """A fold's search that kept other sets may know them in the wrong forms: the better fit is kept."""
+    """Whatever forms a fold's search likes better: what tells them apart may be the very rows left out."""
     causes = frozenset(["creep"])
     relaxing = null_problem.force * (1.0 - 0.03 * np.log10(1.0 + null_problem.middle().time_at_level))
     problem = replace(null_problem, force=relaxing)
@@ -54,13 +54,14 @@ def test_named_causes_are_refitted_in_the_forms_that_were_named(null_problem: Pr
     assert plain.log_evidence > bent.log_evidence + 10.0
     for known, before in ((plain, bent), (bent, plain)):
         found = Search(problem, ("creep",), Alone(problem), fits={(causes, 0): before})
-        found.refit_like(known)
-        assert found.fits[causes, 0].effects == plain.effects
-        assert {size for _, size in found.fits} == set(range(len(SIZES)))
+        again = found.refit_like(known)
+        assert again is not None
+        assert again.effects == known.effects and again.log_evidence >= known.log_evidence - 5.0
+        assert found.fits == {(causes, 0): before}
 
 
 def test_of_two_levels_cycles_are_left_out(null_problem: Problem) -> None:
-    """Or nothing is, where there are two cycles as well."""
+    """Or nothing is, where there are two cycles as well. No offset is hidden: to name one gains nothing."""
     problem = null_problem.take(null_problem.level < 2)
     softer = problem.force + 0.05 * problem.force_scale * problem.middle().displacement / 1e-2
     problem = replace(problem, force=softer)
@@ -70,7 +71,7 @@ def test_of_two_levels_cycles_are_left_out(null_problem: Problem) -> None:
     assert gain is not None
     assert gain.held_out == "cycle"
     assert gain.folds == len(np.unique(problem.cycle)) >= FEWEST
-    assert gain.rmse_named < gain.rmse_before
+    assert gain.rmse_named == pytest.approx(gain.rmse_before, rel=0.01)
     assert measure_gain(problem.take(problem.cycle <= 2), tested, named) is None
 
 
