@@ -42,9 +42,9 @@ def beyond_noise(residual: Array, variance: Array) -> float:
     return max(float(np.mean(residual[telling] ** 2 - variance[telling])), 0.0)
 
 
-def structured(problem: Problem, fitted: Fit) -> float:
-    """Mean square (N²) of what a fit's equations leave beyond the noise."""
-    return beyond_noise(problem.force - fitted.force, np.diagonal(problem.noise))
+def structured(problem: Problem, force: Array) -> float:
+    """Mean square (N²) of what a model's force (n,) leaves beyond the noise."""
+    return beyond_noise(problem.force - force, np.diagonal(problem.noise))
 
 
 def misfit_budget(found: Search, causes: Set) -> Budget:
@@ -53,7 +53,7 @@ def misfit_budget(found: Search, causes: Set) -> Budget:
     worth: dict[Set, float] = {}
     for k in range(len(causes) + 1):
         for part in map(frozenset, combinations(sorted(causes), k)):
-            own = structured(problem, found.taken_at_word(part, 0))
+            own = structured(problem, found.taken_at_word(part, 0).force)
             # A cause of size 0 is as good as none: no set leaves more than its parts.
             worth[part] = min([own, *(worth[part - {e}] for e in part)])
     before = worth[frozenset()]

@@ -139,6 +139,8 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
             "rmse_named_N": _round(gain.rmse_named),
             "elpd_gain": _round(gain.elpd_gain),
             "elpd_gain_se": _round(gain.elpd_gain_se),
+            "elpd_gain_named": _round(gain.elpd_gain_named),
+            "elpd_gain_named_se": _round(gain.elpd_gain_named_se),
             "coverage90_before": _round(gain.coverage90_before),
             "coverage90_after": _round(gain.coverage90_after),
             "coverage90_named": _round(gain.coverage90_named),

@@ -116,6 +116,20 @@ def doubt_about(problem: Problem, key: str, found: Fit) -> Array:
     return found.doubt_sd * doubt_on_rows(problem, key, found.effects, values, found.eta, guide)
 
 
+def by_equations(problem: Problem, found: Fit) -> Array:
+    """Force (n,), N, of a fit's equations at their sizes, the moduli fitted to them alone.
+
+    Free moduli lean on a doubt: without it they are others.
+    """
+    if found.doubt_sd == 0.0:
+        return found.force
+    chain = chain_for(problem.blueprint.model_dump_json(), found.effects)
+    climb = Climb(problem, chain, found.size, np.empty((len(problem), 0)))
+    p = chain.linear_size
+    place = climb.look_with_its_signs(found.u, climb.guide(), np.zeros(p))
+    return climb.look_with_its_signs(found.u, place.guide, place.eta[:p]).force
+
+
 def fit(
     problem: Problem,
     effects: frozenset[str],

@@ -48,6 +48,8 @@ class Gain:
     rmse_named: float
     elpd_gain: float
     elpd_gain_se: float
+    elpd_gain_named: float
+    elpd_gain_named_se: float
     coverage90_before: float
     coverage90_after: float
     coverage90_named: float
@@ -94,20 +96,29 @@ def measure_gain(
         for r in zip(*(f.residuals for f in folds), strict=True)
     ]
     covered = [float(np.mean(np.concatenate(i))) for i in zip(*(f.inside for f in folds), strict=True)]
-    gains = np.array([f.elpd[1] - f.elpd[0] for f in folds])
+    (gained, gained_se), (named_gained, named_se) = (
+        _total([f.elpd[which] - f.elpd[0] for f in folds]) for which in (1, 2)
+    )
     return Gain(
         held_out="cycle" if by_cycle else "pressure",
         rmse_before=errors[0],
         rmse_after=errors[1],
         rmse_named=errors[2],
-        elpd_gain=float(gains.sum()),
-        elpd_gain_se=float(np.sqrt(len(gains)) * gains.std(ddof=1)),
+        elpd_gain=gained,
+        elpd_gain_se=gained_se,
+        elpd_gain_named=named_gained,
+        elpd_gain_named_se=named_se,
         coverage90_before=covered[0],
         coverage90_after=covered[1],
         coverage90_named=covered[2],
         folds_same_set=sum(f.chosen == causes for f in folds),
         folds=len(folds),
     )
+
+
+def _total(gains: list[float]) -> tuple[float, float]:
+    """Sum of what the folds gain, and its standard error."""
+    return float(np.sum(gains)), float(np.sqrt(len(gains)) * np.std(gains, ddof=1))
 
 
 def _fold(

@@ -9,6 +9,7 @@ import numpy as np
 
 from mpam_calib.criticism.budget import remainder_rms, structured
 from mpam_calib.criticism.faults import FAULTLESS, Faults, faults_of
+from mpam_calib.criticism.fit import by_equations
 from mpam_calib.criticism.load_cell import NO_RIVAL, load_cell_rival
 from mpam_calib.criticism.problem import SIZES
 from mpam_calib.criticism.refits import Set
@@ -123,13 +124,14 @@ def _structure_left(found: Search, leading: Set, size: int) -> bool:
 
 
 def _lessens(found: Search, effects: Set) -> bool:
-    """Whether the causes leave less misfit than there was, what they leave to doubts about them included.
+    """Whether the causes' equations leave less misfit than there was, whatever their doubts would add.
 
     A cause of a huge size would otherwise be a licence to doubt it.
     """
     problem = found.problem
-    after = structured(problem, found.refit(effects, 0))
-    return after <= structured(problem, found.refit(frozenset(), 0))
+    fitted = found.refit(effects, 0)
+    after = structured(problem, by_equations(problem, fitted))
+    return after <= structured(problem, found.refit(frozenset(), 0).force)
 
 
 def _standing(found: Search, leading: Set) -> Set:

@@ -120,21 +120,32 @@ def _unproven(content: dict[str, Any]) -> list[str]:
     gain = content["gain"]
     if gain is None:
         return []
-    before, after = (significant(gain[f"rmse_{when}_N"]) for when in ("before", "after"))
-    against = []
-    if gain["rmse_after_N"] >= gain["rmse_before_N"]:
-        against.append(f"their error is {after} N with such causes and {before} N without")
-    if gain["elpd_gain"] < 0.0:
-        against.append("they are less probable with such causes than without")
-    if gain["coverage90_after"] < COVERED:
-        against.append(f"{100.0 * gain['coverage90_after']:.0f} % of them lie in the 90 % bands")
-    if not against:
-        return []
     which = {"cycle": "cycles", "pressure": "pressure levels"}[gain["held_out"]]
-    return [
-        f"Readings of whole {which} that were left out speak against this result: {'; '.join(against)}. "
-        "Make the measurement that tells the causes apart before you rely on them."
-    ]
+    if against := _against(gain, "named", "elpd_gain_named", "these"):
+        return [
+            f"Readings of whole {which} that were left out speak against this result: {against}. "
+            "Make the measurement that tells the causes apart before you rely on them."
+        ]
+    if against := _against(gain, "after", "elpd_gain", "such"):
+        return [
+            f"With whole {which} left out the search may settle on other causes, or on other forms of them, "
+            f"that do not hold in those: {against}. The causes named here, fitted to the same rows, do: "
+            f"their error is {significant(gain['rmse_named_N'])} N."
+        ]
+    return []
+
+
+def _against(gain: dict[str, Any], which: str, elpd: str, such: str) -> str:
+    """What left-out readings say against one of the two kinds of causes, if anything."""
+    before, after = (significant(gain[f"rmse_{when}_N"]) for when in ("before", which))
+    against = []
+    if gain[f"rmse_{which}_N"] >= gain["rmse_before_N"]:
+        against.append(f"their error is {after} N with {such} causes and {before} N without")
+    if gain[elpd] < 0.0:
+        against.append(f"they are less probable with {such} causes than without")
+    if gain[f"coverage90_{which}"] < COVERED:
+        against.append(f"{100.0 * gain[f'coverage90_{which}']:.0f} % of them lie in the 90 % bands")
+    return "; ".join(against)
 
 
 def _left(content: dict[str, Any]) -> list[str]:
@@ -353,7 +364,7 @@ def _gain(content: dict[str, Any]) -> list[Block]:
         f"{gain['folds_same_set']} of them chose the same causes. The held-out readings are "
         f"{gain['elpd_gain']:.4g} ± {gain['elpd_gain_se']:.3g} nats more probable with the extended model. "
         "With fewer data a fold may recognise other causes: the last column keeps those named above, "
-        "fitted anew in every fold."
+        f"fitted anew in every fold ({gain['elpd_gain_named']:.4g} ± {gain['elpd_gain_named_se']:.3g} nats)."
     )
     table = pd.DataFrame(rows)
     return [

@@ -62,7 +62,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "pressure_droop": ("bent", "level", "level-bent", "power", "level-power", "speed", "lagging", "volume"),
     "rig_compliance": ("bent", "power", "toe", "preload"),
     "law_shape": ("bent", "exponential"),
-    "order_too_low": ("bent", "steady", "steady-bent", "fung", "gent"),
+    "order_too_low": ("bent", "line", "steady", "steady-bent", "fung", "gent"),
 }
 """Other forms of the effects, declared as ``id:form``."""
 

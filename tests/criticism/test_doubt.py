@@ -10,7 +10,7 @@ from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.doubt import DOUBTS
-from mpam_calib.criticism.fit import Fit, Under, chain_for, doubt_columns, fit
+from mpam_calib.criticism.fit import Fit, Under, by_equations, chain_for, doubt_columns, fit
 from mpam_calib.criticism.problem import Problem
 
 DOUBT = max(DOUBTS)
@@ -143,3 +143,18 @@ def test_columns_vanish_with_the_cause(problem: Problem) -> None:
 
     assert size(0.0) < 1e-9
     assert size(0.02) == pytest.approx(2.0 * size(0.01), rel=0.05)
+
+
+def test_moduli_that_leaned_on_a_doubt_are_fitted_anew_without_it() -> None:
+    """Free moduli and a doubt share what both can hold: alone, the equations leave less than beside it."""
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
+    problem = problem_of(specimen_of(recipe.name))
+    x = problem.middle().displacement / problem.middle().displacement.max()
+    made = problem.with_force(problem.force + 0.02 * problem.force_scale * (x - x**2))
+    found = fit(made, frozenset(["tip_shape"]), 0, {"tip_factor": 0.5}, doubts=(DOUBT,))
+    assert found.doubt_sd == DOUBT
+    alone = by_equations(made, found)
+    left = [float(np.sum(made.white(made.force - force, 0) ** 2)) for force in (alone, found.force)]
+    assert left[0] < left[1]
+    plain = fit(made, frozenset(["tip_shape"]), 0)
+    np.testing.assert_array_equal(by_equations(made, plain), plain.force)

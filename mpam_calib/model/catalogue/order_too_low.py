@@ -95,6 +95,22 @@ def _steady(state: State, values: Values, setting: Setting) -> State:
     return replace(state, lost=state.lost - force)
 
 
+def _line(state: State, values: Values, setting: Setting) -> State:
+    """The missing modulus has a line of its own in pressure, as the others of a linear law have."""
+    force = _term(state, values, setting)
+    if setting.simulation.law != "constant":
+        share = values["steady_share"]
+        pressure = (1.0 - share) * state.readings.pressure + share * middle_pressure(setting)
+        force = force * pressure / setting.top_pressure
+    return replace(state, lost=state.lost - force)
+
+
+def _steady_share(setting: Setting) -> tuple[Parameter, ...]:
+    return (
+        Parameter("steady_share", Normal(0.5, 1.0), "share of the term that no pressure changes", "", ""),
+    )
+
+
 register(
     Effect(
         id="order_too_low",
@@ -106,9 +122,10 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"fung": _fung, "gent": _gent, "steady": _steady},
-        own={"fung": _hardening, "gent": _limit},
+        forms={"line": _line, "fung": _fung, "gent": _gent, "steady": _steady},
+        own={"line": _steady_share, "fung": _hardening, "gent": _limit},
         sources={
+            "line": "thesis Eq. 4.7 for the missing modulus: a line of its own in pressure",
             "fung": "exponential hardening (Fung 1967); Ogden 1972 to the same order",
             "gent": "limiting extensibility, 1/(1 − J/J_m) with J ∝ e² (Gent 1996, doi:10.5254/1.3538357)",
         },
