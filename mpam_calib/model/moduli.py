@@ -104,7 +104,7 @@ class Law:
         if self.name == "constant":
             return np.ones((1, P.shape[1], 1, 1))
         if self.name == "linear":
-            return np.stack([P, np.ones_like(P)], axis=-1)[..., None]
+            return np.moveaxis(np.stack([P, np.ones_like(P)]), 0, -1)[..., None]
         if self.name == "free":
             known = level >= 0
             hats = np.eye(len(self.levels))[level]

@@ -65,7 +65,8 @@ def modulus_columns(shape: Shape, rest: Rest, convention: str, order: int) -> Ar
     for _ in range(order - 1):
         axial, hoop = axial * z, hoop * x
         columns.append(axial - hoop)
-    return np.stack(columns, axis=-1)
+    # A few moduli and many readings: products with pressure run along the readings.
+    return np.moveaxis(np.stack(columns), 0, -1)
 
 
 def braid_energy_force(P: Array, L: Array, rest: Rest, E_br: float, R_br: float, n: int) -> Array:
