@@ -35,7 +35,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "braid_angle": ("bent", "seating"),
     "braid_stretch": ("bent", "power", "longer"),
     "wall_pressure": ("bent", "thick"),
-    "length_offset": ("bent", "scale", "slip", "settling", "seating", "rezeroed"),
+    "length_offset": ("bent", "scale", "line", "slip", "settling", "seating", "rezeroed"),
     "strand_friction": ("bent", "power", "contact"),
     "coulomb_friction": ("bent", "constant", "capstan", "power"),
     "rate_friction": (

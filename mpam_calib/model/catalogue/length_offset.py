@@ -28,6 +28,17 @@ def _scale(state: State, values: Values, setting: Setting) -> State:
     return replace(state, displacement=state.displacement + values["offset_mm"] * part)
 
 
+def _line(state: State, values: Values, setting: Setting) -> State:
+    """Zero and scale are both off: the error is a line in the stroke, and the offset at half of it."""
+    share = values["scale_share"]
+    part = 1.0 - share + share * state.displacement / (0.5 * setting.stroke)
+    return replace(state, displacement=state.displacement + values["offset_mm"] * part)
+
+
+def _scale_share(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("scale_share", Normal(0.5, 1.0), "share of the offset that is one of scale", "", ""),)
+
+
 def _slip(state: State, values: Values, setting: Setting) -> State:
     """The grips slip early in the test, and then hold: the offset at half the test."""
     part = settled(state.readings.time, values["slip_s"], half_test(setting))
@@ -90,16 +101,24 @@ register(
         memory=False,
         forms={
             "scale": _scale,
+            "line": _line,
             "slip": _slip,
             "settling": _settling,
             "seating": _seating,
             "rezeroed": _rezeroed,
         },
-        own={"slip": _slip_time, "settling": _excess, "seating": _exponent, "rezeroed": _parts},
+        own={
+            "line": _scale_share,
+            "slip": _slip_time,
+            "settling": _excess,
+            "seating": _exponent,
+            "rezeroed": _parts,
+        },
         recalls=("slip", "settling"),
         apart=("rezeroed",),
         sources={
             "scale": "textbook: gain error of a displacement sensor",
+            "line": "textbook: a displacement sensor's calibration line, wrong in zero and gain",
             "slip": "textbook: first-order settling of a clamp, 1 − exp(−t/τ)",
             "settling": "textbook: an offset with an exponential transient, 1 + c·exp(−t/τ)",
             "seating": "textbook: end fittings that seat under pressure, δ·(P/P_middle)^m",
