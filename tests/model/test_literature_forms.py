@@ -334,3 +334,25 @@ def test_a_preloaded_fixture_is_stiff_up_to_its_preload() -> None:
     held = replace(start(setting, rows(setting, 4)), guide=scale * np.array([[0.1, 0.2, 0.6, 1.0]]))
     moved = effect("rig_compliance:preload").apply(held, values, setting).displacement - held.displacement
     np.testing.assert_allclose(moved, 1e-5 * scale * np.array([[0.0, 0.0, 0.5, 1.0]]), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("identifier", "share", "other"),
+    [("order_too_low", "steady_share", "steady"), ("length_offset", "scale_share", "scale")],
+)
+def test_a_line_is_the_effect_at_one_end_and_another_form_at_the_other(
+    identifier: str, share: str, other: str
+) -> None:
+    setting = setting_for(identifier, "linear")
+    readings = rows(setting)
+    sizes = drawn(identifier, setting, 0.5, 0.0)
+
+    def at(form: str, **more: np.ndarray) -> np.ndarray:
+        return force(
+            setting_for(f"{identifier}:{form}" if form else identifier, "linear"), sizes | more, readings
+        )
+
+    for value, form in ((0.0, ""), (1.0, other)):
+        np.testing.assert_allclose(at("line", **{share: np.full((1, 1), value)}), at(form), rtol=1e-12)
+    half = at("line", **{share: np.full((1, 1), 0.5)})
+    assert np.max(np.abs(half - at(""))) > 1e-3 and np.max(np.abs(half - at(other))) > 1e-3
