@@ -43,8 +43,10 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
         *("stroke", "stroke-power", "stroke-drag"),
     ),
     "presliding": (
-        *("bent", "rest", "rest-bent", "masing", "masing-bent", "sliding", "sliding-bent"),
-        *("ramp", "ramp-bent", "power", "dahl", "rest-dahl", "masing-dahl", "sliding-dahl"),
+        *("bent", "rest", "rest-bent", "once", "once-bent", "masing", "masing-bent"),
+        *("sliding", "sliding-bent", "ramp", "ramp-bent", "power"),
+        *("dahl", "rest-dahl", "once-dahl", "masing-dahl", "sliding-dahl"),
+        *("wen", "rest-wen", "once-wen"),
     ),
     "stress_softening": (
         *("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),
@@ -59,7 +61,10 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
         *("bent", "settling", "settling-bent", "tared", "tared-bent"),
         *("early", "power", "root", "thermal", "return"),
     ),
-    "pressure_droop": ("bent", "level", "level-bent", "power", "level-power", "speed", "lagging", "volume"),
+    "pressure_droop": (
+        *("bent", "level", "level-bent", "power", "level-power"),
+        *("speed", "lagging", "volume", "refill"),
+    ),
     "rig_compliance": ("bent", "power", "toe", "preload"),
     "law_shape": ("bent", "exponential"),
     "order_too_low": ("bent", "line", "steady", "steady-bent", "fung", "gent"),

@@ -17,6 +17,8 @@ from .test_literature_forms import LEVELS, SPEED, rows, setting_for, start
 
 STEPS = 400
 """Readings of a stroke."""
+TURN = 50
+"""Steps of an integration on either side of a turn."""
 
 
 def driven(setting: Setting, strokes: int = 4) -> Readings:
@@ -36,6 +38,19 @@ def driven(setting: Setting, strokes: int = 4) -> Readings:
         speed=np.full(len(x), SPEED),
         pace=np.full(len(x), SPEED),
     )
+
+
+def small_steps(readings: Readings, setting: Setting) -> list[np.ndarray]:
+    """The way (m) from one reading of :func:`driven` to the next, in many steps: TURN to the turn between."""
+    step = setting.stroke / STEPS
+    way = np.where(readings.travel < step, 0.5 * step, step)
+    turning = np.where(readings.travel < step, 0.5 * step, 0.0)
+    turning[0] = 0.0
+    before = np.concatenate([[1.0], -readings.sign[:-1]])
+    return [
+        np.concatenate([np.full(TURN, b * t / TURN), np.full(TURN, -s * w / TURN)])
+        for b, t, s, w in zip(before, turning, readings.sign, way, strict=True)
+    ]
 
 
 def one(value: float) -> np.ndarray:
@@ -76,6 +91,26 @@ def test_a_supply_that_fills_a_volume_droops_in_proportion_to_it() -> None:
     assert np.max(part[0] - place) > 0.02  # and not the stroke's
 
 
+@pytest.mark.parametrize("lasts", [0.1, 1.0, 10.0, 1e4])
+def test_a_supply_that_refills_keeps_the_gas_s_balance(lasts: float) -> None:
+    """q = ∫ (dx − q dt/τ), never below 0; where it lasts without end, that is the droop by volume."""
+    setting = setting_for("pressure_droop:refill")
+    readings, way = driven(setting), lasts * setting.stroke
+    q, missing = 0.0, []
+    for step in small_steps(readings, setting):
+        for dx in step:
+            q = max(q * np.exp(-abs(dx) / way) + dx, 0.0)
+        missing.append(q)
+
+    def droop(form: str, **seconds: float) -> np.ndarray:
+        values = {name: one(value) for name, value in ({"droop_percent": 0.1} | seconds).items()}
+        state = effect(f"pressure_droop:{form}").apply(start(setting, readings), values, setting)
+        return 1.0 - state.pressure[0] / readings.pressure
+
+    expected = np.array(missing) / readings.displacement * droop("volume", supply_lag_s=1e-9)
+    np.testing.assert_allclose(droop("refill", refill_s=way / SPEED), expected, atol=5e-4 * 0.1)
+
+
 def test_a_supply_without_a_lag_is_the_plain_droop() -> None:
     setting = setting_for("pressure_droop:lagging")
     readings = driven(setting)
@@ -108,6 +143,28 @@ def test_friction_from_rest_builds_up_as_sliders_do(exponent: float) -> None:
         friction.append(-float(weights @ load))
         before = x
     assert sign == pytest.approx(np.array(friction), abs=0.03)
+
+
+@pytest.mark.parametrize("form", ["wen", "rest-wen", "once-wen"])
+@pytest.mark.parametrize("exponent", [1.0, 2.0])
+def test_friction_by_bouc_and_wen_follows_their_equation(form: str, exponent: float) -> None:
+    """dz/dx = 1 − |z|^n (1 + sgn(z ẋ))/2, through two levels that begin in one way or another."""
+    setting = setting_for("presliding:wen")
+    level = driven(setting, strokes=2)
+    readings = Readings.join([replace(level, test_cycle=np.full(2 * STEPS, i)) for i in (1.0, 2.0)])
+    reversal = 0.1 * setting.stroke
+    values = {"reversal_mm": one(reversal), "wen_exponent": one(exponent)}
+    found = effect(f"presliding:{form}").apply(start(setting, readings), values, setting).sign[0]
+    begins = {"wen": (1.0, 1.0), "rest-wen": (0.0, 0.0), "once-wen": (0.0, None)}[form]
+    z, expected = 0.0, []
+    for i, step in enumerate(small_steps(readings, setting)):
+        begun = begins[i // (2 * STEPS)] if i % (2 * STEPS) == 0 else None
+        if begun is not None:
+            z, step = begun, step[TURN:]
+        for dx in -step / reversal:
+            z += dx * (1.0 - abs(z) ** exponent * (z * dx > 0.0))
+        expected.append(z)
+    np.testing.assert_allclose(found, expected, atol=1e-3)
 
 
 def test_rubber_is_as_new_on_its_first_stroke_and_at_the_end_of_every_other() -> None:

@@ -28,6 +28,8 @@ AWAY = {
     # Friction is as declared at the mean speed, and a law as declared in the middle.
     "rate_friction": {"speed": 4.0 * SPEED, "pace": 4.0 * SPEED},
     "law_shape": {"pressure": 1e3 * LEVELS[-1]},
+    # After a turn a supply has hardly anything to refill.
+    "pressure_droop": {"travel": 5e-3},
 }
 
 
@@ -205,6 +207,7 @@ def test_a_form_starts_near_the_effect_s_own_equation(form: str) -> None:
         "pressure_droop:speed",
         "pressure_droop:lagging",
         "pressure_droop:volume",
+        "pressure_droop:refill",
     ],
 )
 def test_a_form_with_a_memory_says_so(form: str) -> None:

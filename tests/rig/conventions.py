@@ -100,6 +100,22 @@ def _steep_at_once(state: State, size: float) -> None:
     state.turn = state.turn * (2.0 * part - 1.0)
 
 
+def _carried_over(state: State, size: float) -> None:
+    """Bouc and Wen's friction (n = 2), from none when the test begins, carried on from level to level."""
+    rows = state.rows
+    turn, friction = np.zeros(rows.count), 0.0
+    moves = -np.diff(rows.displacement, prepend=0.0) / max(size, 1e-6)
+    for i, move in enumerate(moves):
+        way = 1.0 if move > 0.0 else -1.0
+        along, left = friction * way, abs(move)
+        if along < 0.0:
+            along, left = min(along + left, 0.0), max(left + along, 0.0)
+        along = along if along < 0.0 else float(np.tanh(np.arctanh(min(along, 1.0 - 1e-12)) + left))
+        friction = along * way
+        turn[i] = friction * rows.direction[i]
+    state.turn = state.turn * turn
+
+
 def _by_the_stroke(state: State, size: float) -> None:
     """A power of the speed that the crosshead was set to, whatever it does at its turns."""
     speed = state.rows.nominal_speed
@@ -147,6 +163,8 @@ CONVENTIONS: dict[str, Form] = {
         _by("sliding_at_first", "presliding", _sliding_at_first),
         # Friction builds up from none on a level's first stroke: Maxwell's slip.
         _by("slipping_one_by_one", "presliding", _slipping_one_by_one),
+        # Friction is none only when the test begins; every level goes on from where the one before ended.
+        _by("carried_over", "presliding", _carried_over),
         # Friction turns over by a root of the travel.
         _by("steep_at_once", "presliding", _steep_at_once),
         # Friction goes by the speed that the stroke was driven with, the gentle turns included.

@@ -16,7 +16,8 @@ from mpam_calib.model.state import Setting, State
 Array = NDArray[np.float64]
 Apply = Callable[[State, Values, Setting], State]
 
-DAHL = ("dahl", "rest-dahl", "masing-dahl", "sliding-dahl")
+DAHL = ("dahl", "rest-dahl", "once-dahl", "masing-dahl", "sliding-dahl")
+WEN = ("wen", "rest-wen", "once-wen")
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -41,6 +42,28 @@ def _dahl(state: State, values: Values) -> Array:
     turn = state.readings.travel / values["reversal_mm"]
     left = np.log1p(np.maximum(beyond * turn, NONE_LEFT - 1.0)) / beyond
     return np.asarray(np.exp(-np.minimum(left, 700.0)))
+
+
+def _bouc_wen(state: State, values: Values) -> Array:
+    """Bouc and Wen's law: even up to no friction, then slower by its power n (n = 1 and 2: exactly)."""
+    return 0.5 * (1.0 - _built_up(state.readings.travel / values["reversal_mm"] - 1.0, values))
+
+
+def _bouc_wen_from_rest(state: State, values: Values) -> Array:
+    """The same, on a stroke that no reversal began from no friction on."""
+    readings = state.readings
+    return 0.5 * (1.0 - _built_up(readings.travel / values["reversal_mm"] - readings.reversal, values))
+
+
+def _built_up(beyond: Array, values: Values) -> Array:
+    """Friction, as a share of the full, so many reversals beyond none: dσ/dx = (1 − σ)(1 + (n − 1)σ)."""
+    n = values["wen_exponent"]
+    left = np.exp(-np.clip(n * beyond, 0.0, 700.0))
+    return np.where(beyond < 0.0, beyond, (1.0 - left) / (1.0 + (n - 1.0) * left))
+
+
+def _wen_exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("wen_exponent", LogNormal(1.5, 0.4), "how sudden full friction comes", "Wen 1976", ""),)
 
 
 def _power(state: State, values: Values) -> Array:
@@ -68,13 +91,19 @@ MASING = 2.0
 """How much quicker friction builds up from none than it turns over: Masing's rule."""
 
 
-def _turning(left: Callable[[State, Values], Array], first: float, quicker: float = 1.0) -> Apply:
-    """Friction that turns over, on a level's ``first`` stroke by so much and so much ``quicker``."""
+def _turning(
+    left: Callable[[State, Values], Array], first: float, quicker: float = 1.0, *, once: bool = False
+) -> Apply:
+    """Friction that turns over, on a level's ``first`` stroke by so much and so much ``quicker``.
+
+    With ``once`` that is the test's very first stroke alone: the others begin where the level before ended.
+    """
 
     def apply(state: State, values: Values, setting: Setting) -> State:
-        reversal = state.readings.reversal
-        travel = state.readings.travel * (quicker + (1.0 - quicker) * reversal)
-        turned = replace(state, readings=replace(state.readings, travel=travel))
+        readings = state.readings
+        reversal = np.where(readings.test_cycle > 1.0, 1.0, readings.reversal) if once else readings.reversal
+        travel = readings.travel * (quicker + (1.0 - quicker) * reversal)
+        turned = replace(state, readings=replace(readings, travel=travel, reversal=reversal))
         swing = first + (AGAINST - first) * reversal
         return replace(state, sign=state.sign * (1.0 - swing * left(turned, values)))
 
@@ -93,26 +122,33 @@ register(
         apply=_turning(_exponential, AGAINST),
         forms={
             "rest": _turning(_exponential, REST),
+            "once": _turning(_exponential, REST, once=True),
             "masing": _turning(_exponential, REST, MASING),
             "sliding": _turning(_exponential, SLIDING),
             "ramp": _turning(_ramp, AGAINST),
             "power": _turning(_power, AGAINST),
             "dahl": _turning(_dahl, AGAINST),
             "rest-dahl": _turning(_dahl, REST),
+            "once-dahl": _turning(_dahl, REST, once=True),
             "masing-dahl": _turning(_dahl, REST, MASING),
             "sliding-dahl": _turning(_dahl, SLIDING),
+            "wen": _turning(_bouc_wen, AGAINST),
+            "rest-wen": _turning(_bouc_wen_from_rest, AGAINST),
+            "once-wen": _turning(_bouc_wen_from_rest, AGAINST, once=True),
         },
         kinds={
             "rest": "here a level's first stroke starts from rest",
+            "once": "here only the test's very first stroke starts from rest",
             "masing": "here a level's first stroke starts from rest, in half the travel",
             "sliding": "here not on a level's first stroke",
             "ramp": "here in proportion to the travel",
         },
-        own=dict.fromkeys(DAHL, _exponent) | {"power": _steepness},
+        own=dict.fromkeys(DAHL, _exponent) | dict.fromkeys(WEN, _wen_exponent) | {"power": _steepness},
         sources=dict.fromkeys(
             DAHL,
             "Dahl 1976, exponent i after Bliman 1992; i = 1/2: Iwan 1966, Masing's rule with even slip",
         )
+        | dict.fromkeys(WEN, "Bouc 1967, Wen 1976 (J. Eng. Mech. Div. 102), β = γ; n = 2: an arc of tanh")
         | {"power": "power law of the hysteresis curve (Swevers et al. 2000, IEEE Trans. Autom. Control 45)"},
         bends={"travel": 3},
         looseness=2.0,

@@ -15,8 +15,8 @@ from mpam_calib.physics.kinematics import SHORTEST, radius_inextensible_braid
 
 Array = NDArray[np.float64]
 
-LAG_SHARE, NO_WAY = 0.1, 1e-12
-"""A supply's typical lag over a stroke's time; a way (m) as good as none."""
+LAG_SHARE, NO_WAY, NO_PLACE = 0.1, 1e-12, 1e-9
+"""A supply's typical lag over a stroke's time; a way and a place (m) as good as none."""
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -72,14 +72,34 @@ def _lagging(state: State, values: Values, setting: Setting) -> State:
 
 def _volume(state: State, values: Values, setting: Setting) -> State:
     """The same in proportion to the volume that the braid encloses and the supply has to fill."""
+    return _drooped(state, values, _filled(_place(state, values), state, setting))
+
+
+def _filled(place: Array, state: State, setting: Setting) -> Array:
+    """Volume inside the braid since the start of the stroke, as a share of a whole stroke's."""
 
     def volume(shortening: Array) -> Array:
         length = np.maximum(state.rest.L0 - shortening, SHORTEST * state.rest.L0)
         return np.asarray(radius_inextensible_braid(length, state.rest) ** 2 * length)
 
     at_rest, full = volume(np.zeros((1, 1))), volume(np.full((1, 1), setting.stroke))
-    part = (volume(_place(state, values)) - at_rest) / (full - at_rest)
-    return _drooped(state, values, part)
+    return np.asarray((volume(place) - at_rest) / (full - at_rest))
+
+
+def _refill(state: State, values: Values, setting: Setting) -> State:
+    """What is missing grows with the volume while the supply refills it, dq/dt = dV/dt − q/τ.
+
+    What is too much leaves at once (q ≥ 0), so that every contraction starts with none missing; each stroke
+    is taken to have one speed, and the volume to grow evenly up to where it is.
+    """
+    readings = state.readings
+    way = np.maximum(readings.pace * values["refill_s"], NO_WAY)
+    contracting = -way * np.expm1(-readings.travel / way)
+    at_turn = -way * readings.reversal * np.expm1(-(state.displacement + readings.travel) / way)
+    lengthening = (at_turn + way) * np.exp(-readings.travel / way) - way
+    missing = np.where(readings.sign < 0.0, contracting, np.maximum(lengthening, 0.0))
+    place = np.maximum(state.displacement, NO_PLACE)
+    return _drooped(state, values, missing / place * _filled(place, state, setting))
 
 
 def _place(state: State, values: Values) -> Array:
@@ -91,9 +111,18 @@ def _place(state: State, values: Values) -> Array:
 
 
 def _lag(setting: Setting) -> tuple[Parameter, ...]:
-    stroke_time = setting.stroke / setting.speed if setting.speed > 0.0 else 1.0
-    prior = LogNormal(LAG_SHARE * stroke_time, 0.7)
+    prior = LogNormal(LAG_SHARE * _stroke_time(setting), 0.7)
     return (Parameter("supply_lag_s", prior, "time in which the supply follows the stroke", "textbook"),)
+
+
+def _refill_time(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LogNormal(_stroke_time(setting), 1.0)
+    return (Parameter("refill_s", prior, "time in which the supply refills the muscle", "textbook"),)
+
+
+def _stroke_time(setting: Setting) -> float:
+    """A stroke's time at the test's mean speed, s."""
+    return setting.stroke / setting.speed if setting.speed > 0.0 else 1.0
 
 
 register(
@@ -114,17 +143,19 @@ register(
             "speed": _speed,
             "lagging": _lagging,
             "volume": _volume,
+            "refill": _refill,
         },
         own=dict.fromkeys(("power", "level-power"), _exponent)
         | dict.fromkeys(("lagging", "volume"), _lag)
-        | {"speed": _flow_exponent},
-        recalls=("speed", "lagging", "volume"),
+        | {"speed": _flow_exponent, "refill": _refill_time},
+        recalls=("speed", "lagging", "volume", "refill"),
         sources={
             "power": "textbook: quadratic in the stroke; near 0.8 in proportion to the muscle's volume",
             "level-power": "the same over each level's own stroke",
             "speed": "line losses: Hagen-Poiseuille ∝ flow, turbulent or orifice ∝ flow²",
             "lagging": "textbook: first-order lag of a regulator or a line, τ·dy/dt + y = x",
             "volume": "the same of the muscle's volume πR²L in place of its stroke",
+            "refill": "mass balance of a muscle behind a throttle: dq/dt = dV/dt − q/τ, q ≥ 0",
         },
         kinds={"level": "here full stroke is each level's own"},
         bends={"contraction": 3, "pace": 1},
