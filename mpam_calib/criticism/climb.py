@@ -45,6 +45,9 @@ RUNAWAY = 10.0
 """Times the force scale that such a force may move at once before it is given up."""
 DECEIVED = 0.5
 """Nats by which a climb may have been better off than with the force come to rest."""
+HOPE, SHORT = 4.0, 30.0
+"""Times its promise by which a climb may yet rise, and nats that it may then be short of what it is to reach:
+what has fewer sizes need not fit as well."""
 COARSE = 0.01
 """Share of the misfit below which the sizes have settled well enough to let them bend."""
 
@@ -82,12 +85,16 @@ class Place:
 
 @dataclass
 class Climb:
-    """A climb beside a remainder of SIZES[size]; ``extra`` (n, r), N, are further linear columns."""
+    """A climb beside a remainder of SIZES[size]; ``extra`` (n, r), N, are further linear columns.
+
+    One that has no hope to come near the objective ``rival`` is given up on its way.
+    """
 
     problem: Problem
     chain: Chain
     size: int
     extra: Array
+    rival: float = -np.inf
     _kept: tuple[Array, Unsigned] | None = field(default=None, init=False, repr=False)
 
     @cached_property
@@ -259,6 +266,8 @@ class Climb:
             step = np.zeros(len(hessian))
             step[free] = _solve(damped, gradient[free])
             promise = 0.5 * float(step @ gradient)
+            if released and best.objective + HOPE * promise < self.rival - SHORT:
+                break
             left = misfit - 2.0 * len(self.problem)
             if d == 0 or (promise < max(CONVERGED, SHARE * left) and not waiting and released):
                 break

@@ -58,6 +58,12 @@ class Fit:
     chi2: float
     under: tuple[Under, ...]
 
+    @property
+    def objective(self) -> float:
+        """The log density at the mode, up to a constant of the problem and the remainder's size."""
+        squares = self.u @ self.u + self.eta @ self.eta + self.zeta @ self.zeta
+        return -0.5 * float(self.chi2 + squares)
+
     def draw(self, name: str, count: int, rng: np.random.Generator) -> Array:
         """Draws (count,) of one coordinate, every doubt in play by its probability.
 
@@ -137,16 +143,18 @@ def fit(
     start: dict[str, float] | None = None,
     blueprint: Blueprint | None = None,
     doubts: tuple[float, ...] = (),
+    rival: float = -np.inf,
 ) -> Fit:
     """Refit the simulation with these effects against a remainder of SIZES[size].
 
     ``start`` gives coordinates by parameter name to start from (0 otherwise); ``blueprint`` another
     declared simulation than the problem's; ``doubts`` how far the effects' forms may be off, with equal
-    prior probabilities (none: not at all). Raises ``LinAlgError`` where no climb from there ends.
+    prior probabilities (none: not at all); a climb without hope to come near the objective of a ``rival``
+    ends early. Raises ``LinAlgError`` where no climb from there ends.
     """
     key = (blueprint or problem.blueprint).model_dump_json()
     chain, n = chain_for(key, effects), len(problem)
-    climb = Climb(problem, chain, size, np.empty((n, 0)))
+    climb = Climb(problem, chain, size, np.empty((n, 0)), rival)
     u = np.array([(start or {}).get(name, 0.0) for name in climb.names], dtype=np.float64)
     place = climb.climb(u, climb.guide(), np.zeros(chain.linear_size))
     plain = _fitted(effects, climb, place, 0.0)

@@ -96,11 +96,13 @@ def _better(
     start: dict[str, float],
     doubts: tuple[float, ...] = (),
 ) -> Fit | None:
+    """The better of a fit and another climb, which is given up once it shows that it will not be."""
     try:
         # On its way a climb may pass through shapes that no muscle has.
         with warnings.catch_warnings(), np.errstate(over="ignore", invalid="ignore"):
             warnings.simplefilter("ignore", linalg.LinAlgWarning)
-            found = fit(held_problem(), frozenset(forms), size, start, doubts=doubts)
+            rival = -np.inf if best is None or doubts else best.objective
+            found = fit(held_problem(), frozenset(forms), size, start, doubts=doubts, rival=rival)
     except np.linalg.LinAlgError:
         return best
     found = replace(found, log_evidence=found.log_evidence - sum(map(price, sorted(forms))))
