@@ -266,7 +266,7 @@ class Climb:
             step = np.zeros(len(hessian))
             step[free] = _solve(damped, gradient[free])
             promise = 0.5 * float(step @ gradient)
-            if released and best.objective + HOPE * promise < self.rival - SHORT:
+            if released and damping < RIDGE and best.objective + HOPE * promise < self.rival - SHORT:
                 break
             left = misfit - 2.0 * len(self.problem)
             if d == 0 or (promise < max(CONVERGED, SHARE * left) and not waiting and released):

@@ -13,7 +13,7 @@ from rig.effects import shared_form
 from rig.recipes import Recipe, Wanted, build_case
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.climb import Climb
+from mpam_calib.criticism.climb import Climb, Place
 from mpam_calib.criticism.fit import chain_for, doubt_on_rows, fit
 from mpam_calib.criticism.forms import flexible, forms_of, price
 from mpam_calib.criticism.refits import best_of, with_better_forms, with_doubt, with_doubted_equations
@@ -99,6 +99,33 @@ def test_an_equation_that_is_a_little_off_is_not_left_to_a_bend(identifier: str)
     assert chosen.effects == effects
     assert chosen.log_evidence == pytest.approx(doubted.log_evidence, abs=0.5)
     assert among_all.log_evidence >= chosen.log_evidence
+
+
+def test_a_climb_is_given_up_only_without_hope(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = problem_of(specimen_of("practice-separable-004", "practice"))
+    hidden, poor = (
+        frozenset({"braid_kinematics", "pressure_droop"}),
+        frozenset({"dead_band", "length_offset"}),
+    )
+    looks: list[Place] = []
+    look = Climb.look
+
+    def counted(self: Climb, *where: np.ndarray) -> Place:
+        looks.append(look(self, *where))
+        return looks[-1]
+
+    def climbed(effects: frozenset[str], rival: float) -> tuple[float, int]:
+        looks.clear()
+        return fit(problem, effects, 0, rival=rival).log_evidence, len(looks)
+
+    monkeypatch.setattr(Climb, "look", counted)
+    good, bad = (fit(problem, effects, 0) for effects in (hidden, poor))
+    assert bad.log_evidence < good.log_evidence - 1000.0
+    whole, given_up = climbed(poor, -np.inf), climbed(poor, good.objective)
+    assert given_up[1] < whole[1] and given_up[0] <= whole[0] + 0.01
+    # What comes near, or is better, is climbed as if there were no rival.
+    assert climbed(poor, bad.objective + 20.0) == whole
+    assert climbed(hidden, bad.objective)[0] == good.log_evidence
 
 
 def undoubted(found: Search) -> Search:
