@@ -14,6 +14,7 @@ from mpam_calib.model.moduli import Law, ModuliBlock
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.kinematics import SHAPES
+from mpam_calib.physics.statics import axial_lever, hoop_lever, strains
 from mpam_calib.specimen.effect_ids import forms_of_id
 from mpam_calib.units import si_factor, unit_of
 
@@ -28,6 +29,8 @@ AWAY = {
     # Friction is as declared at the mean speed, and a law as declared in the middle.
     "rate_friction": {"speed": 4.0 * SPEED, "pace": 4.0 * SPEED},
     "law_shape": {"pressure": 1e3 * LEVELS[-1]},
+    # Half-way a fit to all strains may leave nothing; most it leaves beyond them.
+    "order_too_low": {"displacement": 0.011},
     # After a turn a supply has hardly anything to refill.
     "pressure_droop": {"travel": 5e-3},
 }
@@ -243,6 +246,25 @@ def test_a_law_s_curve_is_an_exponential_but_for_the_law(rate: float) -> None:
     target = np.exp(rate * x)
     found = basis @ np.linalg.lstsq(basis, target, rcond=None)[0]
     np.testing.assert_allclose(found, target, atol=2e-4 * np.ptp(target))
+
+
+def test_a_fit_of_too_low_an_order_leaves_what_least_squares_leave() -> None:
+    setting = setting_for("order_too_low:fitted")
+    readings, hardening, reach = replace(rows(setting), sign=np.zeros(60)), 0.7, 0.3
+    values = {"next_order": 0.1, "hardening": hardening, "tested_strain": reach}
+    there = force(setting, {k: np.full((1, 1), v) for k, v in values.items()}, readings)[0]
+    found = there - force(without(setting), {}, readings)[0]
+
+    def wall(strain: np.ndarray) -> np.ndarray:
+        return strain**3 * np.exp(hardening * strain)
+
+    tested = np.linspace(0.0, reach, 41)[1:]
+    fitted = np.linalg.lstsq(np.stack([tested, tested**2], axis=1), wall(tested), rcond=None)[0]
+    rest = start(setting, readings).rest
+    shape = SHAPES["inextensible_braid"](rest.L0 - readings.displacement, rest)
+    axial, hoop = (wall(s) - np.polyval([*fitted[::-1], 0.0], s) for s in strains(shape, rest, "engineering"))
+    expected = (axial_lever(shape) * axial - hoop_lever(shape) * hoop)[0]
+    np.testing.assert_allclose(found / expected, np.median(found / expected), rtol=1e-6)
 
 
 def test_a_law_at_its_natural_size_is_its_lowest_bend() -> None:
