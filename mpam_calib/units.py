@@ -17,6 +17,8 @@ GPA: Final = 1e9
 """pascals in a gigapascal"""
 DEG: Final = math.pi / 180.0
 """radians in a degree"""
+ATMOSPHERE: Final = 101.325 * KPA
+"""the standard atmosphere, pascals"""
 MINUTE: Final = 60.0
 """seconds in a minute"""
 DECIMALS: Final = 7

@@ -71,11 +71,17 @@ def _strokes(rows: Rows, residual: Array) -> list[list[Array]]:
 
 
 def detrended(rows: Rows, residual: Array) -> Iterator[tuple[slice, Array]]:
-    """Each stroke without its turns: its place among the readings, and its residuals less a smooth curve."""
+    """Each stroke without its turns: its place among the readings, and its residuals less a smooth curve.
+
+    Nor with the rests at its ends: where friction fades at a dead stop the force is as fast as in a burst.
+    """
     first = np.flatnonzero(np.diff(rows.stroke, prepend=-1))
     for start, stop in pairwise([*first.tolist(), len(residual)]):
         margin = int(np.ceil(TURNS * (stop - start)))
-        here = slice(start + margin, stop - margin)
+        moving = start + np.flatnonzero(~rows.rest[start:stop])
+        if not len(moving):
+            continue
+        here = slice(max(start + margin, int(moving[0])), min(stop - margin, int(moving[-1]) + 1))
         piece = residual[here]
         if len(piece) >= FEWEST:
             degree = min(DEGREE, len(piece) // READINGS_EACH)

@@ -126,6 +126,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "hum_N": _round(verdict.faults.hum),
         "step_N": _round(verdict.faults.step),
         "load_cell_nats": None if verdict.load_cell is None else _round(verdict.load_cell),
+        "load_cell_fault": verdict.cell_fault,
         "searched": {
             "sets": len(diagnosis.search.seen | {effects for effects, _ in diagnosis.search.searched}),
             "largest": LARGEST,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.bins import beyond_floor
 from mpam_calib.posterior.points import Points
-from mpam_calib.posterior.row_motion import row_readings
+from mpam_calib.posterior.row_motion import at_rest, row_readings
 from mpam_calib.specimen.recording import Loops
 
 Array = NDArray[np.float64]
@@ -24,11 +24,15 @@ MOST_STROKES, MOST_POINTS = 90, 600
 
 @dataclass(frozen=True)
 class Rows:
-    """Raw readings (n,) in strokes: what the model needs, force (N), stroke; not slack, not unclear."""
+    """Raw readings (n,) in strokes: what the model needs, force (N), stroke; not slack, not unclear.
+
+    ``rest`` are those at which the crosshead stands still.
+    """
 
     readings: Readings
     force: Array
     stroke: Ints
+    rest: NDArray[np.bool_]
 
     @staticmethod
     def of(loops: Loops) -> Rows:
@@ -39,7 +43,8 @@ class Rows:
         if len(keep) > MOST_ROWS:
             keep = keep & (loops.stroke < loops.stroke[MOST_ROWS])
         index = np.flatnonzero(keep)
-        return Rows(row_readings(loops).take(index), loops.force_N[index], loops.stroke[index])
+        readings, rest = row_readings(loops).take(index), at_rest(loops)[index]
+        return Rows(readings, loops.force_N[index], loops.stroke[index], rest)
 
 
 def _slack(loops: Loops) -> NDArray[np.bool_]:

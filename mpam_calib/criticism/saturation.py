@@ -6,6 +6,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from mpam_calib.posterior.row_motion import at_rest
 from mpam_calib.specimen.recording import LOADING, NO_BRANCH, UNLOADING, Loops
 
 Array = NDArray[np.float64]
@@ -53,18 +54,22 @@ def along_a_ceiling(loops: Loops, noise: float) -> Bools:
     An amplifier that saturates in front of a converter adds its noise afterwards, so no two readings are the
     same. ``noise`` (N) is the sd of a reading. A muscle's own force has no edge: beside the ceiling every
     stroke is a parabola that breaks off, and no smooth curve through both does as well. Smallest forces are
-    not looked at: there muscles go slack.
+    not looked at: there muscles go slack. Nor are readings at rest, whose force stands still by itself.
     """
-    ceiling = _crowd(loops.force_N[~loops.censored], noise)
+    found, rest = np.zeros(len(loops.force_N), dtype=bool), at_rest(loops)
+    moving = loops.without(rest)
+    ceiling = _crowd(moving.force_N[~moving.censored], noise)
     if ceiling is None:
-        return np.zeros(len(loops.force_N), dtype=bool)
-    found = _strokes_along(loops, ceiling, noise)
+        return found
+    found[~rest] = _strokes_along(moving, ceiling, noise)
     # Once it is shown, single readings at the ceiling are as wrong as those of strokes along it.
     return found | (loops.force_N > ceiling - WITHIN * noise) if found.any() else found
 
 
 def _crowd(force: Array, noise: float) -> float | None:
     """The place (N) near the largest of the forces about which readings crowd; None where they do not."""
+    if not len(force):
+        return None
     ordered = np.sort(force)
 
     def about(places: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -33,9 +33,9 @@ class Verdict:
     """The word, the leading set, and every set with its probability (best first).
 
     ``standing`` are the causes that hold even beside a remainder; ``size`` indexes the remainder's size
-    under the leading set, which leaves the ``faults``; ``load_cell`` is by how many nats a load cell that
-    gives way beats that set, where it comes near; ``unseen`` are the sets with one cause more that the data
-    do not exclude, unless structure is left that would pass for it.
+    under the leading set, which leaves the ``faults``; ``load_cell`` is by how many nats a load cell at fault
+    (``cell_fault``) beats that set, where it comes near; ``unseen`` are the sets with one cause more that the
+    data do not exclude, unless structure is left that would pass for it.
     """
 
     word: Word
@@ -46,6 +46,7 @@ class Verdict:
     size: int
     faults: Faults = FAULTLESS
     load_cell: float | None = None
+    cell_fault: str = ""
     unseen: frozenset[Set] = frozenset()
 
     def others(self) -> dict[Set, float]:
@@ -89,8 +90,8 @@ def judge(found: Search) -> Verdict:
             standing &= rival.beside
         if not _lessens(found, standing):
             standing = frozenset()
-        load_cell = rival.lead if gives_way else None
-        return Verdict("unexplained", leading, standing, probabilities, marginals, size, faults, load_cell)
+        held = Verdict("unexplained", leading, standing, probabilities, marginals, size, faults)
+        return replace(held, load_cell=rival.lead, cell_fault=rival.fault) if gives_way else held
     if nothing:
         size = found.best_size(frozenset())
         unseen = _unseen(found, frozenset())

@@ -163,6 +163,12 @@ def speeds(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array,
     return np.where(rest, typical[segment], local), rest
 
 
+def at_rest(loops: Loops) -> NDArray[np.bool_]:
+    """Rows (rows,) at which the crosshead stands still."""
+    first, lengths = loops.strokes
+    return speeds(loops, first, first + lengths - 1, np.repeat(np.arange(len(first)), lengths))[1]
+
+
 def paces(speed: Array, rest: NDArray[np.bool_], segment: Ints) -> Array:
     """A stroke's own speed (strokes,), m/s: the median over its rows under way, over all where none is."""
     still = np.bincount(segment, ~rest) == 0

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mpam_calib.criticism.diagnose import Diagnosis
+from mpam_calib.criticism.load_cell import ZEROED
 from mpam_calib.criticism.verdict import BESIDE
 from mpam_calib.model.bend import FORM, is_bend
 from mpam_calib.model.effect import effect
@@ -172,8 +173,11 @@ def _left(content: dict[str, Any]) -> list[str]:
     if content["load_cell_nats"] is not None:
         by = "better" if content["load_cell_nats"] > 0.0 else "nearly as well"
         found.append(
-            f"a load cell that shows less and less of large forces explains the readings {by}: load it with "
-            "dead weights up to the blocked force"
+            f"a load cell whose zero differs from level to level explains the readings {by}: look at it with "
+            "the muscle unhooked, before and after each level"
+            if content["load_cell_fault"] == ZEROED
+            else f"a load cell that shows less and less of large forces explains the readings {by}: load it "
+            "with dead weights up to the blocked force"
         )
     elif content["remainder_N"] > 0.0 or not found:
         size = significant(content["remainder_N"])

@@ -33,11 +33,11 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "tip_shape": ("bent", "working", "power", "round", "tapered", "volume"),
     "braid_kinematics": ("bent", "swell", "thickness"),
     "braid_angle": ("bent", "seating"),
-    "braid_stretch": ("bent", "power", "longer"),
-    "wall_pressure": ("bent", "thick"),
+    "braid_stretch": ("bent", "power", "longer", "both"),
+    "wall_pressure": ("bent", "thick", "pressed"),
     "length_offset": ("bent", "scale", "line", "slip", "settling", "seating", "rezeroed"),
-    "strand_friction": ("bent", "power", "contact"),
-    "coulomb_friction": ("bent", "constant", "capstan", "power"),
+    "strand_friction": ("bent", "power", "even", "contact"),
+    "coulomb_friction": ("bent", "constant", "capstan", "power", "branch"),
     "rate_friction": (
         *("bent", "viscous", "viscous-bent", "power", "drag"),
         *("stroke", "stroke-power", "stroke-drag"),
@@ -51,7 +51,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "stress_softening": (
         *("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),
         *("power", "force-power", "test-power", "test-force-power"),
-        *("virgin", "virgin-fading", "force-fading", "test-virgin", "test-force-virgin"),
+        *("virgin", "virgin-fading", "force-fading", "fresh", "path", "test-virgin", "test-force-virgin"),
     ),
     "creep": (
         *("bent", "wall", "wall-bent", "early", "power", "solid"),
@@ -63,7 +63,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "pressure_droop": (
         *("bent", "level", "level-bent", "power", "level-power"),
-        *("speed", "lagging", "volume", "refill"),
+        *("speed", "lagging", "volume", "reservoir", "refill"),
     ),
     "rig_compliance": ("bent", "power", "toe", "preload"),
     "law_shape": ("bent", "exponential"),

@@ -10,10 +10,9 @@ from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import FileKind, Geometry
 from mpam_calib.specimen.motion import turn_threshold, turning_points
 from mpam_calib.specimen.recording import Floats, Ints
-from mpam_calib.units import KPA, MM
+from mpam_calib.units import ATMOSPHERE, KPA, MM
 
 HIGHEST_LEVEL_KPA = 5000.0
-ATMOSPHERE_KPA = 101.325
 HIGHEST_STRAIN = 20.0
 LEAST_STROKE = 0.005
 """Smaller largest displacements, as a share of L0, are taken for metres."""
@@ -30,10 +29,10 @@ def map_hint(kind: FileKind, column: str, scale: str) -> str:
 
 def check_pressure(label: str, kind: FileKind, pressure_Pa: Floats, rows: Ints) -> None:
     """Refuse a level above 5,000 kPa or below a vacuum; ``rows`` are the editor's numbers of the readings."""
-    low = np.flatnonzero(pressure_Pa < -ATMOSPHERE_KPA * KPA)
+    low = np.flatnonzero(pressure_Pa < -ATMOSPHERE)
     if len(low):
         found = f"a pressure level of {pressure_Pa[low[0]] / KPA:g} kPa"
-        expected = f"above the atmosphere's, or down to -{ATMOSPHERE_KPA:g} kPa (a vacuum)"
+        expected = f"above the atmosphere's, or down to -{ATMOSPHERE / KPA:g} kPa (a vacuum)"
         raise InputError(label, found, expected, int(rows[low[0]]), "pressure_kPa")
     high = np.flatnonzero(pressure_Pa > HIGHEST_LEVEL_KPA * KPA)
     if len(high):

@@ -80,10 +80,11 @@ def test_a_hum_is_found_with_its_size(rows: Rows, filtered: str, readings: float
 def test_strokes_with_readings_missing_are_left_out(rows: Rows) -> None:
     """A line in a spectrum supposes even steps; what is left is enough, and nothing at all is no error."""
     some = np.random.default_rng(2).random(len(rows.force)) > 0.5
-    gaps = Rows(rows.readings.take(some), rows.force[some], rows.stroke[some])
+    gaps = Rows(rows.readings.take(some), rows.force[some], rows.stroke[some], rows.rest[some])
     assert hum_rms(gaps, noise_of("white", gaps, 1)) == 0.0
     none = np.zeros(len(rows.force), dtype=bool)
-    assert hum_rms(Rows(rows.readings.take(none), rows.force[none], rows.stroke[none]), np.zeros(0)) == 0.0
+    nothing = Rows(rows.readings.take(none), rows.force[none], rows.stroke[none], rows.rest[none])
+    assert hum_rms(nothing, np.zeros(0)) == 0.0
 
 
 def humming(size: float) -> Problem:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -158,9 +158,57 @@ def test_a_ceiling_is_seen_through_noise(name: str, share: float) -> None:
     found = along_a_ceiling(clipped, noise)
     assert not saturated(clipped).any()
     assert found.mean() == pytest.approx(share, abs=0.3 * share)
-    assert not np.any(found & ~above & (loops.force_N < limit - 3.0 * noise))
+    # Three of the noise's sds below a ceiling whose place is known to half of one.
+    assert not np.any(found & ~above & (loops.force_N < limit - 3.5 * noise))
     # One reading at the end of a stroke is as wrong as twenty.
     assert np.sum(above & ~found) <= 0.02 * np.sum(above)
+
+
+def with_rests(name: str, rows: int) -> Specimen:
+    """The specimen with so many readings more at the end of every stroke, the crosshead at rest."""
+    specimen = specimen_of(name)
+    loops = specimen.loops
+    assert loops is not None
+    first, length = loops.strokes
+    count = np.ones(len(loops.force_N), dtype=int)
+    count[first + length - 1] += rows
+    here = np.repeat(np.arange(len(count)), count)
+    added = np.arange(len(here)) - np.searchsorted(here, here)
+    step = float(np.median(np.diff(loops.time_s)))
+    arrays = {
+        f.name: value[here] for f in fields(loops) if isinstance(value := getattr(loops, f.name), np.ndarray)
+    }
+    arrays["time_s"] = arrays["time_s"] + step * np.cumsum(added > 0)
+    noise = problem_of(specimen).noise_level.total * np.random.default_rng(5).standard_normal(len(here))
+    arrays["force_N"] = np.where(added > 0, arrays["force_N"] + noise, arrays["force_N"])
+    return replace(specimen, loops=replace(loops, **arrays))
+
+
+@pytest.mark.parametrize("name", [*NULLS, "develop-null-004", "develop-null-010"])
+def test_a_muscle_that_is_held_is_no_ceiling(name: str) -> None:
+    """Readings at the longest, where the force is largest, crowd about it; a ceiling is seen all the same."""
+    specimen = with_rests(name, 8)
+    loops = specimen.loops
+    assert loops is not None
+    noise = problem_of(specimen_of(name)).noise_level.total
+    assert not along_a_ceiling(loops, noise).any()
+    limit = float(np.quantile(loops.force_N, 0.9))
+    above = loops.force_N >= limit
+    after = noise * np.random.default_rng(3).standard_normal(len(above))
+    found = along_a_ceiling(replace(loops, force_N=np.where(above, limit + after, loops.force_N)), noise)
+    assert found.mean() == pytest.approx(0.1, abs=0.04)
+
+
+@pytest.mark.parametrize("name", NULLS)
+def test_friction_that_fades_at_rest_is_no_burst(name: str) -> None:
+    """However much of it, at every stop; bursts under way are seen as before."""
+    problem = problem_of(with_rests(name, 8))
+    assert problem.rows is not None
+    sd = np.ones(len(problem.rows.force))
+    quiet, loud = in_bursts(problem, 15.0 * problem.noise_level.total, 1)
+    faded = np.where(problem.rows.rest, -10.0 * problem.noise_level.total * problem.rows.readings.sign, 0.0)
+    assert bursts_rms(problem.rows, quiet + faded, sd) == 0.0
+    assert bursts_rms(problem.rows, loud + faded, sd) > 0.0
 
 
 def test_readings_along_a_ceiling_are_left_out(specimen: Specimen) -> None:

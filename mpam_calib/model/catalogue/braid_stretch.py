@@ -47,6 +47,11 @@ def _longer(state: State, values: Values, setting: Setting) -> State:
     return replace(state, shape=with_longer_strands(state.shape, state.rest, state.kinematics, strain))
 
 
+def _both(state: State, values: Values, setting: Setting) -> State:
+    """Longer strands that store their energy, too."""
+    return _longer(_apply(state, values, setting), values, setting)
+
+
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("braid_exponent", LogNormal(1.7, 0.3), "power of the pressure lost", "textbook", ""),)
 
@@ -63,11 +68,12 @@ register(
         apply=_apply,
         memory=False,
         needs_braid=True,
-        forms={"power": _power, "longer": _longer},
+        forms={"power": _power, "longer": _longer, "both": _both},
         own={"power": _exponent},
         sources={
             "power": "textbook: energy in strands whose stiffness grows with tension, ∝ P^m (linear: 2)",
             "longer": "textbook: Hooke's law of a strand, whose length then sets angle and radius",
+            "both": "the same with the energy of Eq. 2.25 (Davis, Tsagarakis, Canderle & Caldwell 2003)",
         },
         bends={"contraction": 1, "pressure": 2},
         looseness=2.0,

@@ -1,4 +1,4 @@
-"""A load cell that gives way: less and less of the force is shown near the end of its range.
+"""A load cell that gives way near the end of its range, or whose zero differs from level to level.
 
 No cause of the contract's, and never named: whoever sees it has to look at the cell, not at the muscle. But
 what it explains must not pass for the muscle's doing.
@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import HalfLongTailed, LogNormal, LogUniform, Parameter
+from mpam_calib.model.priors import HalfLongTailed, LogNormal, LogUniform, LongTailed, Parameter
 from mpam_calib.model.state import Setting, State
 
 FROM, TO = 0.03, 3.0
@@ -37,6 +37,21 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return replace(state, zero=state.zero - values["cell_loss_N"] * beyond ** values["cell_exponent"])
 
 
+def _zeroed(state: State, values: Values, setting: Setting) -> State:
+    """The cell is zeroed anew at every level; between levels it is off as on average."""
+    zeros = [np.asarray(values[p.name]) for p in _zeros(setting)]
+    table = np.concatenate([*zeros, sum(zeros) / len(zeros)], axis=-1)
+    return replace(state, zero=state.zero + table[..., state.readings.level])
+
+
+def _zeros(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LongTailed(0.05 * setting.force_scale)
+    return tuple(
+        Parameter(f"cell_zero_{i}_N", prior, f"zero at level {i}, from the lowest")
+        for i in range(1, len(setting.levels) + 1)
+    )
+
+
 register(
     Effect(
         id="load_cell",
@@ -49,6 +64,10 @@ register(
         apply=_apply,
         memory=False,
         uses_force=True,
+        forms={"zeroed": _zeroed},
+        own={"zeroed": _zeros},
+        leading={"zeroed": 0},
+        sources={"zeroed": "textbook: repeatability of a zero, an error of its own for each level"},
         fault=True,
     )
 )

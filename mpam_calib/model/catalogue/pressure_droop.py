@@ -7,14 +7,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.model.curves import level_stroke, over_mean, power, signed_power
+from mpam_calib.model.curves import level_stroke, middle_pressure, over_mean, power, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import HalfLongTailed, LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.kinematics import SHORTEST, radius_inextensible_braid
+from mpam_calib.units import ATMOSPHERE
 
 Array = NDArray[np.float64]
 
+MOST_LOST = 0.9
+"""Of the pressure above a vacuum, however large the droop."""
 LAG_SHARE, NO_WAY, NO_PLACE = 0.1, 1e-12, 1e-9
 """A supply's typical lag over a stroke's time; a way and a place (m) as good as none."""
 
@@ -73,6 +76,15 @@ def _lagging(state: State, values: Values, setting: Setting) -> State:
 def _volume(state: State, values: Values, setting: Setting) -> State:
     """The same in proportion to the volume that the braid encloses and the supply has to fill."""
     return _drooped(state, values, _filled(_place(state, values), state, setting))
+
+
+def _reservoir(state: State, values: Values, setting: Setting) -> State:
+    """A closed supply that expands into that volume: its pressure above a vacuum falls as 1/(1 + z·V)."""
+    middle = middle_pressure(setting)
+    lost = np.minimum(values["droop_percent"] * middle / (middle + ATMOSPHERE), MOST_LOST)
+    filled = _filled(np.maximum(state.displacement, 0.0), state, setting)
+    expanded = 1.0 + lost / (1.0 - lost) * filled
+    return replace(state, pressure=(state.pressure + ATMOSPHERE) / expanded - ATMOSPHERE)
 
 
 def _filled(place: Array, state: State, setting: Setting) -> Array:
@@ -143,6 +155,7 @@ register(
             "speed": _speed,
             "lagging": _lagging,
             "volume": _volume,
+            "reservoir": _reservoir,
             "refill": _refill,
         },
         own=dict.fromkeys(("power", "level-power"), _exponent)
@@ -155,6 +168,7 @@ register(
             "speed": "line losses: Hagen-Poiseuille ∝ flow, turbulent or orifice ∝ flow²",
             "lagging": "textbook: first-order lag of a regulator or a line, τ·dy/dt + y = x",
             "volume": "the same of the muscle's volume πR²L in place of its stroke",
+            "reservoir": "Boyle's law of a supply that is shut off: (P + P_atm)·V = constant",
             "refill": "mass balance of a muscle behind a throttle: dq/dt = dV/dt − q/τ, q ≥ 0",
         },
         kinds={"level": "here full stroke is each level's own"},

@@ -31,13 +31,29 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    return replace(state, strand=state.strand + values["f_s"])
+    return _rubbing(state, values, np.ones((1, 1)))
 
 
 def _power(state: State, values: Values, setting: Setting) -> State:
     """Another power of the pressure than 4/3: 1 is Amontons' law, 2/3 a Hertzian contact's area."""
-    pressure = state.pressure / middle_pressure(setting)
-    part = power(pressure, values["strand_exponent"] - HERTZIAN)
+    return _rubbing(state, values, _pressed(state, values, setting))
+
+
+def _even(state: State, values: Values, setting: Setting) -> State:
+    """Such a power, with the contact that there is at half the stroke: the same all along it."""
+    middle = _spread(state.rest.L0 - 0.5 * setting.stroke, state.rest)
+    return _rubbing(
+        state, values, _pressed(state, values, setting) * middle / _spread(state.length, state.rest)
+    )
+
+
+def _pressed(state: State, values: Values, setting: Setting) -> Array:
+    """What another power of the pressure makes of Eq. 2.43."""
+    return power(state.pressure / middle_pressure(setting), values["strand_exponent"] - HERTZIAN)
+
+
+def _rubbing(state: State, values: Values, part: Array) -> State:
+    """With so much (B or 1, n) of Eq. 2.43."""
     return replace(state, strand=state.strand + values["f_s"] * part)
 
 
@@ -55,7 +71,7 @@ def _contact(state: State, values: Values, setting: Setting) -> State:
     """Another power of the contact's spread: 0 the same along the stroke, −1 as the whole surface grows."""
     middle = _spread(state.rest.L0 - 0.5 * setting.stroke, state.rest)
     part = power(_spread(state.length, state.rest) / middle, values["contact_exponent"] - 1.0)
-    return replace(state, strand=state.strand + values["f_s"] * part)
+    return _rubbing(state, values, part)
 
 
 def _contact_exponent(setting: Setting) -> tuple[Parameter, ...]:
@@ -77,10 +93,11 @@ register(
         apply=_apply,
         memory=False,
         needs_braid=True,
-        forms={"power": _power, "contact": _contact},
-        own={"power": _exponent, "contact": _contact_exponent},
+        forms={"power": _power, "even": _even, "contact": _contact},
+        own={"power": _exponent, "even": _exponent, "contact": _contact_exponent},
         sources={
             "power": "Amontons ∝ P; Hertzian contacts ∝ P^(2/3) (Archard 1957); Eq. 2.43 ∝ P^(4/3)",
+            "even": "adhesion ∝ contact area ∝ P^m, m = 2/3 to 1 (Bowden & Tabor 1950; Archard 1957)",
             "contact": "friction ∝ pressure × contact area along the stroke (Davis & Caldwell 2006)",
         },
         bends={"pressure": 1, "contraction": 2},

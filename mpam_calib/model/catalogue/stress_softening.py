@@ -22,7 +22,7 @@ Fading = Callable[[Array, Values], Array]
 """The same from cycle to cycle."""
 
 POWERS = ("power", "force-power", "test-power", "test-force-power")
-REACHING = ("virgin", "test-virgin", "test-force-virgin")
+REACHING = ("virgin", "fresh", "test-virgin", "test-force-virgin")
 FADING = ("virgin-fading", "force-fading")
 
 
@@ -81,6 +81,25 @@ def _by_stretch(fading: Fading, over_test: bool = False) -> Share:
     return share
 
 
+def _fresh(state: State, values: Values, setting: Setting) -> Array:
+    """Beside a bladder once stretched: the excess of the first stroke, gone at its end, by energies ∝ x²."""
+    new = (state.readings.cycle < 1.5) & (state.readings.sign < 0.0)
+    reached = np.minimum(state.readings.displacement / level_stroke(state, setting), 1.0)
+    return np.where(new, special.erf((1.0 - reached**2) / values["softening_reach"]), 0.0)
+
+
+def _path(state: State, values: Values, setting: Setting) -> Array:
+    """By the way since the level was reached, forth and back: it softens within a stroke as well."""
+    part = np.minimum(state.readings.displacement / level_stroke(state, setting), 1.0)
+    strokes = 2.0 * (state.readings.cycle - 1.0) + np.where(state.readings.sign < 0.0, part, 2.0 - part)
+    return np.exp(-strokes / values["softening_strokes"])
+
+
+def _strokes(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LogNormal(2.0, 0.7)
+    return (Parameter("softening_strokes", prior, "strokes in which it softens", "Miehe 1995", ""),)
+
+
 def _level_way(state: State, setting: Setting) -> Array:
     """Way (m) to the level's longest stroke; none on its first, which stretches the bladder anew."""
     new = (state.readings.cycle < 1.5) & (state.readings.sign < 0.0)
@@ -127,18 +146,22 @@ register(
             "virgin": _bladder(_by_stretch(_constant)),
             "virgin-fading": _bladder(_by_stretch(_power)),
             "force-fading": _muscle(_by_stretch(_power)),
+            "fresh": _bladder(_fresh),
+            "path": _bladder(_path),
             "test-virgin": _bladder(_by_stretch(_constant, over_test=True)),
             "test-force-virgin": _muscle(_by_stretch(_constant, over_test=True)),
         },
         own=dict.fromkeys(POWERS, _exponent)
         | dict.fromkeys(REACHING, _reach)
-        | dict.fromkeys(FADING, _reach_and_exponent),
+        | dict.fromkeys(FADING, _reach_and_exponent)
+        | {"path": _strokes},
         apart=("virgin-fading",),
         sources=dict.fromkeys(POWERS, "textbook: power of the cycle count (steep: the first cycle alone)")
         | dict.fromkeys(
             (*REACHING, *FADING),
             "Ogden & Roxburgh 1999, with the distance to the longest stroke in place of energies",
-        ),
+        )
+        | {"path": "continuous damage: e^(−way/s) (Miehe 1995, Eur. J. Mech. A 14)"},
         kinds={
             "force": "here the whole muscle, not the bladder alone",
             "test": "here in the first cycles of the whole test, not of each level",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from mpam_calib.model.curves import middle_shape, power
+from mpam_calib.model.curves import middle_pressure, middle_shape, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -35,6 +35,16 @@ def _exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("thickness_exponent", LogNormal(1.0, 0.4), "power of thickness over radius", "", ""),)
 
 
+def _pressed(state: State, values: Values, setting: Setting) -> State:
+    """A wall pressed against the braid takes part the more, or the less, by a power of the pressure."""
+    part = power(state.pressure / middle_pressure(setting), values["wall_exponent"])
+    return _apply(state, {**values, "wall_factor": values["wall_factor"] * part}, setting)
+
+
+def _pressure_exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("wall_exponent", Normal(0.0, 0.5), "power of the pressure", "textbook", ""),)
+
+
 register(
     Effect(
         id="wall_pressure",
@@ -46,9 +56,12 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"thick": _thick},
-        own={"thick": _exponent},
-        sources={"thick": "thick-walled cylinder: the stress's fall across the wall ∝ t/R (Lamé 1852)"},
+        forms={"thick": _thick, "pressed": _pressed},
+        own={"thick": _exponent, "pressed": _pressure_exponent},
+        sources={
+            "thick": "thick-walled cylinder: the stress's fall across the wall ∝ t/R (Lamé 1852)",
+            "pressed": "textbook: a share that goes with a power of the pressure, f·(P/P_middle)^m",
+        },
         bends={"contraction": 2, "pressure": 2},
     )
 )

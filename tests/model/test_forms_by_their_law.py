@@ -1,0 +1,120 @@
+"""Other authors' forms against the law that each is named after."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import special
+
+from mpam_calib.model.effect import effect
+from mpam_calib.model.state import State
+from mpam_calib.physics.kinematics import SHAPES, radius_inextensible_braid
+
+from .test_history_forms import driven, one
+from .test_literature_forms import force, middle, rows, setting_for, start, without
+
+ATMOSPHERE = 101325.0
+
+
+def applied(form: str, **values: float) -> tuple[State, State]:
+    """The state before and after a form, over readings all along the recordings."""
+    setting = setting_for(form)
+    before = start(setting, rows(setting))
+    return before, effect(form).apply(before, {k: one(v) for k, v in values.items()}, setting)
+
+
+@pytest.mark.parametrize("droop", [0.02, 0.1, 0.3])
+def test_a_supply_that_is_shut_off_follows_boyle(droop: float) -> None:
+    """One volume of the supply for all levels: (P + P_atm)·(V_supply + ΔV) stays; no braid, no droop."""
+    form = "pressure_droop:reservoir"
+    setting = setting_for(form)
+    before, after = applied(form, droop_percent=droop)
+    x = np.maximum(before.displacement, 0.0)
+    length = before.rest.L0 - x
+    volume = np.pi * radius_inextensible_braid(length, before.rest) ** 2 * length
+    grown = volume - np.pi * before.rest.R0**2 * before.rest.L0
+    absolute, left = before.pressure + ATMOSPHERE, after.pressure + ATMOSPHERE
+    far = grown > 0.1 * grown.max()
+    supply = (left * grown / np.where(far, absolute - left, 1.0))[far]
+    np.testing.assert_allclose(supply, supply[0], rtol=1e-9)
+    np.testing.assert_allclose(left[grown <= 0.0], absolute[grown <= 0.0])
+    # What is lost at full stroke and the middle of the levels is the droop.
+    at = start(setting, middle(setting, displacement=setting.stroke))
+    lost = 1.0 - effect(form).apply(at, {"droop_percent": one(droop)}, setting).pressure / at.pressure
+    assert float(lost[0, 0]) == pytest.approx(droop, rel=1e-9)
+
+
+@pytest.mark.parametrize("share", [-0.4, 0.2])
+def test_friction_may_differ_from_one_direction_to_the_other(share: float) -> None:
+    before, after = applied("coulomb_friction:branch", K_f=0.1, branch_share=share)
+    sign = before.readings.sign
+    added = np.broadcast_to(after.coulomb - before.coulomb, (1, len(sign)))[0]
+    np.testing.assert_allclose(added[sign > 0.0], 0.1 * (1.0 + share))
+    np.testing.assert_allclose(added[sign < 0.0], 0.1 * (1.0 - share))
+
+
+@pytest.mark.parametrize("exponent", [2.0 / 3.0, 1.0])
+def test_adhesion_is_a_power_of_the_pressure_alone(exponent: float) -> None:
+    form = "strand_friction:even"
+    setting = setting_for(form)
+    values = {"K_f": one(0.0), "f_s": one(0.3), "strand_exponent": one(exponent)}
+
+    def friction(share: float, pressure: float) -> float:
+        at = middle(setting, displacement=share * setting.stroke, pressure=pressure)
+        found = force(setting, values, at) - force(without(setting), {"K_f": one(0.0)}, at)
+        return -float(found[0, 0])
+
+    for pressure in setting.levels:
+        assert friction(0.9, pressure) == pytest.approx(friction(0.1, pressure), rel=1e-9)
+        expected = friction(0.5, setting.levels[0]) * (pressure / setting.levels[0]) ** exponent
+        assert friction(0.5, pressure) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_wall_s_share_may_go_with_the_pressure() -> None:
+    form = "wall_pressure:pressed"
+    before, after = applied(form, wall_factor=0.4, wall_exponent=0.7)
+    missing = 1.0 - after.wall_factor
+    ratio = before.pressure / before.pressure[..., :1]
+    np.testing.assert_allclose(missing, missing[..., :1] * ratio**0.7, rtol=1e-12)
+
+
+def test_strands_that_stretch_grow_longer_and_store_energy() -> None:
+    """What the shape loses and what the force loses, both from one factor."""
+    form = "braid_stretch:both"
+    setting = setting_for(form)
+    before = start(setting, rows(setting))
+    length = before.rest.L0 - before.displacement
+    shaped = replace(before, shape=SHAPES[before.kinematics](length, before.rest))
+    values = {"braid_factor": one(1.3)}
+    both, longer, energy = (
+        effect(f).apply(shaped, values, setting) for f in (form, "braid_stretch:longer", "braid_stretch")
+    )
+    assert both.shape is not None and longer.shape is not None
+    np.testing.assert_array_equal(both.shape.R, longer.shape.R)
+    np.testing.assert_array_equal(both.lost, energy.lost)
+    assert np.all(both.lost > 0.0) and np.any(both.shape.R != shaped.shape.R)
+
+
+def test_damage_by_the_way_fades_exponentially_along_it() -> None:
+    form = "stress_softening:path"
+    setting = setting_for(form)
+    readings = driven(setting)
+    values = {"first_cycle_fraction": one(0.2), "softening_strokes": one(1.6)}
+    gain = effect(form).apply(start(setting, readings), values, setting).wall_gain[0]
+    way = np.cumsum(np.abs(np.diff(readings.displacement, prepend=0.0)))
+    np.testing.assert_allclose((gain - 1.0) / 0.2, np.exp(-way / setting.stroke / 1.6), rtol=5e-3)
+
+
+def test_what_is_stretched_anew_is_ogden_and_roxburgh_s() -> None:
+    """Energies ∝ x²: erf of what is missing to the largest, less that to the largest so far."""
+    form, reach = "stress_softening:fresh", 0.4
+    setting = setting_for(form)
+    readings = driven(setting)
+    values = {"first_cycle_fraction": one(0.2), "softening_reach": one(reach)}
+    gain = effect(form).apply(start(setting, readings), values, setting).wall_gain[0]
+    energy = (readings.displacement / setting.stroke) ** 2
+    so_far = np.maximum.accumulate(energy)
+    expected = special.erf((1.0 - energy) / reach) - special.erf((so_far - energy) / reach)
+    np.testing.assert_allclose((gain - 1.0) / 0.2, expected, atol=0.02)
