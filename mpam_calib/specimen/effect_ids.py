@@ -37,9 +37,9 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "wall_pressure": ("bent", "thick", "pressed"),
     "length_offset": ("bent", "scale", "line", "slip", "settling", "seating", "rezeroed"),
     "strand_friction": ("bent", "power", "even", "contact"),
-    "coulomb_friction": ("bent", "constant", "capstan", "power", "branch"),
+    "coulomb_friction": ("bent", "constant", "capstan", "power"),
     "rate_friction": (
-        *("bent", "viscous", "viscous-bent", "power", "drag"),
+        *("bent", "viscous", "viscous-bent", "power", "stribeck", "drag"),
         *("stroke", "stroke-power", "stroke-drag"),
     ),
     "presliding": (

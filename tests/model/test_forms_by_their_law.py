@@ -46,15 +46,6 @@ def test_a_supply_that_is_shut_off_follows_boyle(droop: float) -> None:
     assert float(lost[0, 0]) == pytest.approx(droop, rel=1e-9)
 
 
-@pytest.mark.parametrize("share", [-0.4, 0.2])
-def test_friction_may_differ_from_one_direction_to_the_other(share: float) -> None:
-    before, after = applied("coulomb_friction:branch", K_f=0.1, branch_share=share)
-    sign = before.readings.sign
-    added = np.broadcast_to(after.coulomb - before.coulomb, (1, len(sign)))[0]
-    np.testing.assert_allclose(added[sign > 0.0], 0.1 * (1.0 + share))
-    np.testing.assert_allclose(added[sign < 0.0], 0.1 * (1.0 - share))
-
-
 @pytest.mark.parametrize("exponent", [2.0 / 3.0, 1.0])
 def test_adhesion_is_a_power_of_the_pressure_alone(exponent: float) -> None:
     form = "strand_friction:even"

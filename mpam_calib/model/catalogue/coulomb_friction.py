@@ -53,17 +53,6 @@ def _power(state: State, values: Values, setting: Setting) -> State:
     return replace(state, coulomb=state.coulomb + values["K_f"] * part)
 
 
-def _branch(state: State, values: Values, setting: Setting) -> State:
-    """More of it in one direction than in the other."""
-    uneven = 1.0 + values["branch_share"] * state.readings.sign
-    return replace(state, coulomb=state.coulomb + values["K_f"] * uneven)
-
-
-def _unevenness(setting: Setting) -> tuple[Parameter, ...]:
-    prior = Normal(0.0, 0.3)
-    return (Parameter("branch_share", prior, "share by which loading has more than unloading less", "", ""),)
-
-
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("force_exponent", LogNormal(0.8, 0.3), "power of the force", "textbook", ""),)
 
@@ -82,13 +71,12 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"constant": _constant, "capstan": _capstan, "power": _power, "branch": _branch},
-        own={"constant": _share, "power": _exponent, "branch": _unevenness},
+        forms={"constant": _constant, "capstan": _capstan, "power": _power},
+        own={"constant": _share, "power": _exponent},
         by_force=("power",),
         sources={
             "constant": "K|F| + a constant dry friction (Chou & Hannaford 1996)",
             "power": "friction of fibres, a·N^n with n from 2/3 to 1 (Howell & Mazur 1953)",
-            "branch": "textbook: friction of two sizes, one for each direction",
             "capstan": "friction of a wound rope (Euler 1769; Eytelwein 1808): F·exp(±μ), K_f = sinh μ",
         },
         bends={"force": 1, "pressure": 2, "contraction": 1},

@@ -74,6 +74,20 @@ def _stroke_power(state: State, values: Values, setting: Setting) -> State:
     return _gained(state, values, growth / np.log(10.0))
 
 
+def _stribeck(state: State, values: Values, setting: Setting) -> State:
+    """Stribeck's curve: what falls with such a power of the speed, and a part that rises with the speed."""
+    speed = over_mean(state.readings.speed, setting)
+    growth = box_cox(speed, values["speed_exponent"]) + values["viscous_share"] * (speed - 1.0)
+    return _gained(state, values, growth / np.log(10.0))
+
+
+def _stribeck_shape(setting: Setting) -> tuple[Parameter, ...]:
+    return (
+        Parameter("speed_exponent", Normal(-0.5, 0.5), "power of the speed", "textbook", ""),
+        Parameter("viscous_share", Normal(0.0, 0.5), "viscous part over that one", "textbook", ""),
+    )
+
+
 def _speed_exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("speed_exponent", Normal(0.5, 0.5), "power of the speed", "textbook", ""),)
 
@@ -107,6 +121,7 @@ register(
         forms={
             "viscous": _viscous,
             "power": _power,
+            "stribeck": _stribeck,
             "drag": _drag,
             "stroke": _stroke,
             "stroke-power": _stroke_power,
@@ -114,12 +129,14 @@ register(
         },
         own={
             "power": _speed_exponent,
+            "stribeck": _stribeck_shape,
             "drag": _drag_exponent,
             "stroke-power": _speed_exponent,
             "stroke-drag": _drag_exponent,
         },
         sources={
             "power": "friction 1 + r(v^n − 1)/n: power law, viscous (n = 1), near Stribeck 1902 for n < 0",
+            "stribeck": "Stribeck 1902, with viscous friction (Armstrong-Hélouvry et al. 1994)",
             "drag": "Herschel & Bulkley 1926: beside dry friction a part ∝ v^n",
             "stroke": "textbook: the same logarithm, of the stroke's own speed",
             "stroke-power": "textbook: friction 1 + r(v^n − 1)/n with the stroke's own speed v",
