@@ -190,6 +190,12 @@ class Problem:
         made.__dict__["axes"] = self.axes.scaled(scale)
         return made
 
+    def with_free_strokes(self) -> Problem:
+        """The same with a remainder in which each stroke has as much of its own as it shares."""
+        made = replace(self, kernel=_kernel(self, 1.0))
+        made.__dict__.update({name: getattr(self, name) for name in ("model", "lean", "bow", "root")})
+        return made
+
     def covariance(self, size: float) -> Array:
         """Noise and a remainder of ``size`` (share of the force scale), N²."""
         return self.noise + (size * self.force_scale) ** 2 * self.kernel
@@ -336,7 +342,7 @@ def _from_differences(force: Array, segment: Ints) -> float:
     return float(1.4826 * np.median(np.abs(second[inside])) / np.sqrt(6.0)) if inside.any() else 1e-3
 
 
-def _kernel(problem: Problem) -> Array:
+def _kernel(problem: Problem, own_share: float = STROKE_SHARE) -> Array:
     """The remainder's covariance for size 1 N (rank at most that of its half-waves)."""
     setting = problem.model.setting
     assert setting is not None
@@ -351,5 +357,5 @@ def _kernel(problem: Problem) -> Array:
     apart = np.exp(-np.abs(pressure[:, None] - pressure) / PRESSURE_LENGTH)
     branch = readings.sign[:, None] == readings.sign
     own = (problem.stroke[:, None] == problem.stroke) & (problem.stroke >= 0)[:, None]
-    result: Array = along * (apart * branch + STROKE_SHARE**2 * own)
+    result: Array = along * (apart * branch + own_share**2 * own)
     return result

@@ -10,6 +10,7 @@ import numpy as np
 from mpam_calib.criticism.budget import remainder_rms, structured
 from mpam_calib.criticism.faults import FAULTLESS, Faults, faults_of
 from mpam_calib.criticism.fit import by_equations
+from mpam_calib.criticism.free_strokes import score_beside
 from mpam_calib.criticism.load_cell import NO_RIVAL, load_cell_rival
 from mpam_calib.criticism.problem import SIZES
 from mpam_calib.criticism.refits import Set
@@ -138,9 +139,9 @@ def _lessens(found: Search, effects: Set) -> bool:
 def _standing(found: Search, leading: Set) -> Set:
     """Causes of the leading set that stand beside the largest remainder, sure and by a clear margin.
 
-    A remainder that may hold anything is the fairest rival: what it can replace is no cause. Where the fit is
-    worse than its noise even so, margins shrink in proportion (quasi-likelihood: McCullagh and Nelder 1989,
-    chapter 9).
+    A remainder that may hold anything is the fairest rival, also one in which every stroke is off in its own
+    way: what it can replace is no cause. Where the fit is worse than its noise even so, margins shrink in
+    proportion (quasi-likelihood: McCullagh and Nelder 1989, chapter 9).
     """
     largest = len(SIZES) - 1
     for e in leading:
@@ -151,11 +152,15 @@ def _standing(found: Search, leading: Set) -> Set:
     total = float(np.logaddexp.reduce(list(scores.values())))
     first = max(scores, key=lambda s: scores[s])
     worse = max(found.fits[first, largest].chi2 / len(found.problem), 1.0)
+    free = found.problem.with_free_strokes()
     standing = set()
     for e in leading:
         with_e = float(np.logaddexp.reduce([v for s, v in scores.items() if e in s]))
-        without = max(v for s, v in scores.items() if e not in s)
-        best = max(v for s, v in scores.items() if e in s)
-        if np.exp(with_e - total) >= SURE and best - without >= STANDS * worse:
-            standing.add(e)
+        without = max((s for s in scores if e not in s), key=lambda s: scores[s])
+        best = max((s for s in scores if e in s), key=lambda s: scores[s])
+        lead = scores[best] - scores[without]
+        if np.exp(with_e - total) >= SURE and lead >= STANDS * worse:
+            lead = score_beside(found, free, best) - score_beside(found, free, without)
+            if lead >= STANDS * worse:
+                standing.add(e)
     return frozenset(standing)

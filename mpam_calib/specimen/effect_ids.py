@@ -63,7 +63,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "pressure_droop": (
         *("bent", "level", "level-bent", "power", "level-power"),
-        *("speed", "lagging", "volume", "reservoir", "refill"),
+        *("loss", "speed", "lagging", "volume", "reservoir", "refill"),
     ),
     "rig_compliance": ("bent", "power", "toe", "preload"),
     "law_shape": ("bent", "exponential"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
+from mpam_calib.criticism import verdict as verdict_module
 from mpam_calib.criticism.fit import fit
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.search import Search
@@ -72,13 +74,28 @@ def search_beside_a_remainder(problem: Problem, margin: float, misfit: float) ->
     [(15.0, 1.0, False), (30.0, 1.0, True), (30.0, 3.0, False), (90.0, 3.0, True)],
 )
 def test_a_cause_stands_beside_unexplained_structure_only_by_far(
-    problem: Problem, margin: float, misfit: float, stands: bool
+    problem: Problem, margin: float, misfit: float, stands: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """And by the further, the more the fits leave beside noise and remainder."""
     found = search_beside_a_remainder(problem, margin, misfit)
+    monkeypatch.setattr(verdict_module, "score_beside", scores_of({CAUSE: margin}))
     assert found.score(CAUSE) - found.score(NOTHING) == pytest.approx(margin)
     verdict = judge(found)
     assert (verdict.word, verdict.standing) == ("unexplained", CAUSE if stands else NOTHING)
+
+
+@pytest.mark.parametrize(("margin", "stands"), [(20.0, False), (30.0, True), (np.nan, False)])
+def test_nor_does_it_stand_where_free_strokes_replace_it(
+    problem: Problem, margin: float, stands: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = search_beside_a_remainder(problem, 90.0, 1.0)
+    monkeypatch.setattr(verdict_module, "score_beside", scores_of({CAUSE: margin}))
+    assert judge(found).standing == (CAUSE if stands else NOTHING)
+
+
+def scores_of(scores: dict[frozenset[str], float]) -> Callable[[Search, Problem, frozenset[str]], float]:
+    """Made-up scores beside free strokes; 0 for the other sets."""
+    return lambda found, problem, effects: scores.get(effects, 0.0)
 
 
 @pytest.mark.parametrize(("margins", "listed", "near"), [(range(20, 31), 5, 0), (range(11), 10, 11)])

@@ -46,6 +46,15 @@ def test_a_supply_that_is_shut_off_follows_boyle(droop: float) -> None:
     assert float(lost[0, 0]) == pytest.approx(droop, rel=1e-9)
 
 
+@pytest.mark.parametrize("exponent", [0.0, 0.5])
+def test_what_a_supply_loses_may_be_the_same_at_every_pressure(exponent: float) -> None:
+    """Or go with its root; as ever in proportion to the stroke."""
+    before, after = applied("pressure_droop:loss", droop_percent=0.05, loss_exponent=exponent)
+    lost, x = before.pressure - after.pressure, before.displacement
+    rate = np.ravel(lost / x / before.pressure**exponent)
+    np.testing.assert_allclose(rate, rate[0], rtol=1e-9)
+
+
 @pytest.mark.parametrize("exponent", [2.0 / 3.0, 1.0])
 def test_adhesion_is_a_power_of_the_pressure_alone(exponent: float) -> None:
     form = "strand_friction:even"

@@ -54,6 +54,16 @@ def _level_power(state: State, values: Values, setting: Setting) -> State:
     return _drooped(state, values, part)
 
 
+def _loss(state: State, values: Values, setting: Setting) -> State:
+    """Lost by another power of the pressure than 1: 0 is the same at every level, 1/2 an orifice's."""
+    ratio = power(state.pressure / middle_pressure(setting), values["loss_exponent"] - 1.0)
+    return _drooped(state, values, ratio * state.displacement / setting.stroke)
+
+
+def _loss_exponent(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("loss_exponent", Normal(0.4, 0.4), "power of the pressure", "textbook", ""),)
+
+
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("droop_exponent", LogNormal(1.5, 0.5), "power of the stroke", "textbook", ""),)
 
@@ -152,6 +162,7 @@ register(
             "level": _level,
             "power": _power,
             "level-power": _level_power,
+            "loss": _loss,
             "speed": _speed,
             "lagging": _lagging,
             "volume": _volume,
@@ -160,11 +171,12 @@ register(
         },
         own=dict.fromkeys(("power", "level-power"), _exponent)
         | dict.fromkeys(("lagging", "volume"), _lag)
-        | {"speed": _flow_exponent, "refill": _refill_time},
+        | {"loss": _loss_exponent, "speed": _flow_exponent, "refill": _refill_time},
         recalls=("speed", "lagging", "volume", "refill"),
         sources={
             "power": "textbook: quadratic in the stroke; near 0.8 in proportion to the muscle's volume",
             "level-power": "the same over each level's own stroke",
+            "loss": "textbook: a loss that is the same at every pressure, or goes with its root (orifice)",
             "speed": "line losses: Hagen-Poiseuille ∝ flow, turbulent or orifice ∝ flow²",
             "lagging": "textbook: first-order lag of a regulator or a line, τ·dy/dt + y = x",
             "volume": "the same of the muscle's volume πR²L in place of its stroke",
