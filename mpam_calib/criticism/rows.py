@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.bins import beyond_floor
 from mpam_calib.posterior.points import Points
-from mpam_calib.posterior.row_motion import at_rest, row_readings
+from mpam_calib.posterior.row_motion import rows_and_rest
 from mpam_calib.specimen.recording import Loops
 
 Array = NDArray[np.float64]
@@ -43,8 +43,8 @@ class Rows:
         if len(keep) > MOST_ROWS:
             keep = keep & (loops.stroke < loops.stroke[MOST_ROWS])
         index = np.flatnonzero(keep)
-        readings, rest = row_readings(loops).take(index), at_rest(loops)[index]
-        return Rows(readings, loops.force_N[index], loops.stroke[index], rest)
+        readings, rest = rows_and_rest(loops)
+        return Rows(readings.take(index), loops.force_N[index], loops.stroke[index], rest[index])
 
 
 def _slack(loops: Loops) -> NDArray[np.bool_]:

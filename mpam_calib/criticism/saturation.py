@@ -6,7 +6,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from mpam_calib.posterior.row_motion import at_rest
+from mpam_calib.posterior.row_motion import rows_and_rest
 from mpam_calib.specimen.recording import LOADING, NO_BRANCH, UNLOADING, Loops
 
 Array = NDArray[np.float64]
@@ -56,7 +56,7 @@ def along_a_ceiling(loops: Loops, noise: float) -> Bools:
     stroke is a parabola that breaks off, and no smooth curve through both does as well. Smallest forces are
     not looked at: there muscles go slack. Nor are readings at rest, whose force stands still by itself.
     """
-    found, rest = np.zeros(len(loops.force_N), dtype=bool), at_rest(loops)
+    found, rest = np.zeros(len(loops.force_N), dtype=bool), rows_and_rest(loops)[1]
     moving = loops.without(rest)
     ceiling = _crowd(moving.force_N[~moving.censored], noise)
     if ceiling is None:

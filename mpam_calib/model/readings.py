@@ -19,7 +19,9 @@ class Readings:
     ``time`` runs over the whole test, ``file_time`` on its file's own clock and ``time_at_level`` since the
     level was reached (s);
     ``cycle`` counts from 1 within a level and ``test_cycle`` over the whole test; ``travel`` is the
-    distance since the last reversal (m) and ``reversal`` 0 on a stroke that no reversal began; ``behind`` is
+    distance since the last reversal (m) and ``reversal`` 0 on a stroke that no reversal began;
+    ``strokes_before`` (n, 2) are the lengths (m) of the stroke before and of the one before that, of
+    whatever level (FAR where there was none); ``behind`` is
     how far (m) the reading lies short of the longest contraction that the test had reached; ``speed``
     (m/s, 0: at rest) is the crosshead's at the reading, ``pace`` that of its whole stroke.
     """
@@ -35,6 +37,7 @@ class Readings:
     test_cycle: Array
     travel: Array
     reversal: Array
+    strokes_before: Array
     behind: Array
     speed: Array
     pace: Array
@@ -84,6 +87,7 @@ class Readings:
             test_cycle=zero + SETTLED,
             travel=zero + FAR,
             reversal=zero,
+            strokes_before=np.full((*p.shape, 2), FAR),
             behind=zero + FAR,
             speed=zero,
             pace=zero,

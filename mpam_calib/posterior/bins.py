@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
-from mpam_calib.posterior.row_motion import history, row_readings, speeds
+from mpam_calib.posterior.row_motion import rows_and_rest
 from mpam_calib.posterior.white import Nodes
 from mpam_calib.specimen.recording import Loops
 
@@ -113,20 +113,13 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
     Those at its turn are finer where they keep ``finest`` rows: in bins of one row the encoder's noise may go
     back and forth, and a covariance of such bins is no chain along the way.
     """
-    stroke_starts, lengths = loops.strokes
-    speed, rest = speeds(
-        loops, stroke_starts, stroke_starts + lengths - 1, np.repeat(np.arange(len(lengths)), lengths)
-    )
-    travel, from_turn, at_level = history(loops, stroke_starts, lengths)
-    reversal = np.repeat(from_turn, lengths)
-    rows = row_readings(loops)
+    rows, rest = rows_and_rest(loops)
     if loops.unclear is not None:
         # What has no sure branch tells of the motion, and nothing else.
         clear = ~loops.unclear
         rest, rows = rest[clear], rows.take(np.flatnonzero(clear))
-        speed, travel, reversal, at_level = (x[clear] for x in (speed, travel, reversal, at_level))
         loops = loops.clear
-        stroke_starts, lengths = loops.strokes
+    stroke_starts, lengths = loops.strokes
     beyond = beyond_floor(loops, stroke_starts)
     per_stroke = [
         np.union1d(_edges(part, most, finest), np.flatnonzero(np.diff(slack, prepend=slack[0])))
@@ -153,7 +146,7 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
     def moving_mean(x: Array) -> Array:
         return np.asarray(np.add.reduceat(weight * x, starts) / np.add.reduceat(weight, starts))
 
-    bin_travel = mean(travel)
+    travel = mean(rows.travel)
     force = mean(loops.force_N)
     common = {
         "pressure": mean(loops.pressure_Pa),
@@ -161,12 +154,13 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
         "level": loops.level[starts],
         "time": mean(loops.time_s),
         "file_time": mean(loops.time_s - loops.began_s),
-        "time_at_level": mean(at_level),
+        "time_at_level": mean(rows.time_at_level),
         "cycle": loops.cycle[starts].astype(np.float64),
         "test_cycle": rows.test_cycle[starts],
         "pace": rows.pace[starts],
-        "reversal": reversal[starts],
-        "speed": np.exp(moving_mean(np.log(np.maximum(speed, 1e-12)))),
+        "reversal": rows.reversal[starts],
+        "strokes_before": rows.strokes_before[starts],
+        "speed": np.exp(moving_mean(np.log(np.maximum(rows.speed, 1e-12)))),
     }
     behind = mean(rows.behind)
     # What is stretched for the first time is so at both points.
@@ -174,7 +168,7 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
     halves = [
         Readings(
             displacement=displacement + side * direction * spread,
-            travel=np.maximum(bin_travel + side * spread, 0.0),
+            travel=np.maximum(travel + side * spread, 0.0),
             behind=np.maximum(behind - side * apart, 0.0),
             **common,
         )

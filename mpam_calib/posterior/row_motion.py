@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.model.readings import Readings
+from mpam_calib.model.readings import FAR, Readings
 from mpam_calib.specimen.motion import run_ids, run_starts
 from mpam_calib.specimen.recording import Loops
 
@@ -21,11 +21,16 @@ where it was under way with the second share before: the motion ended in the ste
 
 def row_readings(loops: Loops) -> Readings:
     """Every row of the loops as a reading, unreduced."""
+    return rows_and_rest(loops)[0]
+
+
+def rows_and_rest(loops: Loops) -> tuple[Readings, NDArray[np.bool_]]:
+    """The same, and whether the crosshead stands still at it (rows,)."""
     first, lengths = loops.strokes
     segment = np.repeat(np.arange(len(first)), lengths)
-    travel, reversal, at_level = history(loops, first, lengths)
-    speed, rest = speeds(loops, first, first + lengths - 1, segment)
-    return Readings(
+    travel, reversal, before, at_level = _history(loops, first, lengths)
+    speed, rest = _speeds(loops, first, first + lengths - 1, segment)
+    readings = Readings(
         pressure=loops.pressure_Pa,
         displacement=loops.displacement_m,
         sign=np.where(np.abs(loops.branch) == 1, loops.branch, 0).astype(np.float64),
@@ -37,10 +42,12 @@ def row_readings(loops: Loops) -> Readings:
         test_cycle=test_cycles(loops),
         travel=travel,
         reversal=reversal[segment],
+        strokes_before=before[segment],
         behind=np.maximum.accumulate(loops.displacement_m) - loops.displacement_m,
         speed=speed,
-        pace=paces(speed, rest, segment)[segment],
+        pace=_paces(speed, rest, segment)[segment],
     )
+    return readings, rest
 
 
 def test_cycles(loops: Loops) -> Array:
@@ -52,8 +59,9 @@ def test_cycles(loops: Loops) -> Array:
     return np.asarray(loops.cycle + (before - first + 1)[run], dtype=np.float64)
 
 
-def history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array]:
-    """Travel since the turn (rows), whether a reversal began the stroke, time at the level (rows)."""
+def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array, Array]:
+    """Travel since the turn (rows); of strokes whether a reversal began them, and the lengths of the two
+    before (strokes, 2); time at the level (rows)."""
     segment = np.repeat(np.arange(len(first)), lengths)
     same_level = np.zeros(len(first), dtype=bool)
     same_level[1:] = (loops.level[first][1:] == loops.level[first][:-1]) & (
@@ -82,7 +90,20 @@ def history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Arr
     run = np.cumsum(~same_level) - 1
     level_start = loops.time_s[first][~same_level]
     at_level = loops.time_s - level_start[run][segment]
-    return travel, (same_level & opposite).astype(np.float64), at_level
+    goes_on = np.concatenate([[False], loops.clock[first][1:] == loops.clock[first][:-1]]) & opposite
+    ended = np.where(turned, turns, came_from)
+    before = _lengths_before(np.abs(ended - np.concatenate([[0.0], turns[:-1]])), goes_on)
+    return travel, turned.astype(np.float64), before, at_level
+
+
+def _lengths_before(length: Array, goes_on: NDArray[np.bool_]) -> Array:
+    """Lengths (strokes, 2) of the two strokes before each, from the ``length`` (strokes,) of the first, m.
+
+    FAR where none of the other direction went before it in the same recording.
+    """
+    one = np.where(goes_on, length, FAR)
+    two = np.where(goes_on, np.concatenate([[FAR], one[:-1]]), FAR)
+    return np.stack([one, two], axis=1)
 
 
 def _since_the_start(
@@ -127,7 +148,7 @@ def _step(time: Array, first: Ints, last: Ints) -> Array:
     return np.asarray(np.maximum((time[last] - time[first]) / np.maximum(last - first, 1), 1e-9))
 
 
-def speeds(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array, NDArray[np.bool_]]:
+def _speeds(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array, NDArray[np.bool_]]:
     """Speed at every row (m/s), over a fortieth of the rows under way to either side; whether it is at rest.
 
     At rest the speed is the one that the stroke otherwise has: friction does not vanish with the motion.
@@ -163,13 +184,7 @@ def speeds(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array,
     return np.where(rest, typical[segment], local), rest
 
 
-def at_rest(loops: Loops) -> NDArray[np.bool_]:
-    """Rows (rows,) at which the crosshead stands still."""
-    first, lengths = loops.strokes
-    return speeds(loops, first, first + lengths - 1, np.repeat(np.arange(len(first)), lengths))[1]
-
-
-def paces(speed: Array, rest: NDArray[np.bool_], segment: Ints) -> Array:
+def _paces(speed: Array, rest: NDArray[np.bool_], segment: Ints) -> Array:
     """A stroke's own speed (strokes,), m/s: the median over its rows under way, over all where none is."""
     still = np.bincount(segment, ~rest) == 0
     counted = ~rest | still[segment]

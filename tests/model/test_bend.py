@@ -10,7 +10,7 @@ import pytest
 from mpam_calib.model.bend import BENDS, DRIVERS, MOST
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.effect import Values, bent, effect, known_effects
-from mpam_calib.model.readings import Readings
+from mpam_calib.model.readings import FAR, Readings
 from mpam_calib.model.state import Setting, State
 from mpam_calib.specimen.effect_ids import forms_of_id
 
@@ -44,6 +44,7 @@ def rows(setting: Setting, count: int = 40) -> Readings:
         test_cycle=1.0 + np.arange(count) % 3,
         travel=share * setting.stroke,
         reversal=np.ones(count),
+        strokes_before=np.full((count, 2), FAR),
         speed=1e-3 * 10.0 ** (2.0 * share - 1.0),
         behind=np.zeros(count),
         pace=np.full(count, 2e-3),

@@ -9,7 +9,7 @@ import pytest
 from scipy import signal
 
 from mpam_calib.model.effect import effect
-from mpam_calib.model.readings import Readings
+from mpam_calib.model.readings import FAR, Readings
 from mpam_calib.model.state import Setting
 from mpam_calib.physics.kinematics import SHAPES
 
@@ -34,6 +34,7 @@ def driven(setting: Setting, strokes: int = 4) -> Readings:
         cycle=number // 2 + 1.0,
         travel=np.tile(way, strokes),
         reversal=(number > 0).astype(float),
+        strokes_before=np.where(number[:, None] > [0, 1], setting.stroke, FAR),
         behind=np.maximum.accumulate(x) - x,
         speed=np.full(len(x), SPEED),
         pace=np.full(len(x), SPEED),
@@ -143,6 +144,59 @@ def test_friction_from_rest_builds_up_as_sliders_do(exponent: float) -> None:
         friction.append(-float(weights @ load))
         before = x
     assert sign == pytest.approx(np.array(friction), abs=0.03)
+
+
+def uneven(setting: Setting, lengths: list[float]) -> Readings:
+    """Strokes of such lengths, in the stroke's own, back and forth from no contraction."""
+    strokes = [driven(setting, strokes=1) for _ in lengths]
+    ways = np.array(lengths) * setting.stroke
+    turns = np.concatenate([[0.0], np.cumsum(ways * (-1.0) ** np.arange(len(ways)))])
+    before = np.concatenate([[FAR, FAR], ways])
+    for i, (stroke, length) in enumerate(zip(strokes, lengths, strict=True)):
+        way, direction = length * stroke.travel, (-1.0) ** i
+        strokes[i] = replace(
+            stroke,
+            displacement=turns[i] + direction * way,
+            sign=np.full(STEPS, -direction),
+            travel=way,
+            reversal=np.full(STEPS, float(i > 0)),
+            cycle=np.full(STEPS, i // 2 + 1.0),
+            strokes_before=np.tile(before[[i + 1, i]], (STEPS, 1)),
+        )
+    return Readings.join(strokes)
+
+
+def friction_by_dahl(setting: Setting, form: str, readings: Readings, reversal: float) -> np.ndarray:
+    values = {"reversal_mm": one(reversal)}
+    return effect(form).apply(start(setting, readings), values, setting).sign[0]
+
+
+@pytest.mark.parametrize(("form", "begins"), [("presliding:rest", 0.0), ("presliding", 1.0)])
+@pytest.mark.parametrize("reversal", [0.05, 0.1])
+def test_small_reversals_hand_on_what_friction_they_reached(
+    form: str, begins: float, reversal: float
+) -> None:
+    """Dahl's equation ds/dx = (±1 − s)/reversal along strokes too short for full friction."""
+    setting = setting_for("presliding:rest")
+    lengths = [1.0, 0.2, 0.15, 0.95, 0.3]
+    readings = uneven(setting, lengths)
+    s, expected = begins, []
+    for i, length in enumerate(lengths):
+        way, direction = (np.arange(STEPS) + 0.5) / STEPS * length, -((-1.0) ** i)
+        expected.append(direction + (s - direction) * np.exp(-way / reversal))
+        s = direction + (s - direction) * np.exp(-length / reversal)
+    found = friction_by_dahl(setting, form, readings, reversal * setting.stroke)
+    np.testing.assert_allclose(found, np.concatenate(expected), atol=0.01)
+
+
+def test_friction_of_short_strokes_alike_never_turns_over_wholly() -> None:
+    setting = setting_for("presliding:rest")
+    readings = uneven(setting, [0.2] * 5)
+    found = friction_by_dahl(setting, "presliding:rest", readings, 0.2 * setting.stroke)
+    left = np.exp(-1.0)
+    steady = (1.0 - left) / (1.0 + left)
+    last = found[-STEPS:]
+    assert last[[0, -1]] == pytest.approx(np.array([-steady, steady]) * readings.sign[-1], abs=0.02)
 
 
 @pytest.mark.parametrize("form", ["wen", "rest-wen", "once-wen"])

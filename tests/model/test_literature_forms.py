@@ -11,7 +11,7 @@ from mpam_calib.model.chain import Chain
 from mpam_calib.model.curves import box_cox
 from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.model.moduli import Law, ModuliBlock
-from mpam_calib.model.readings import Readings
+from mpam_calib.model.readings import FAR, Readings
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.kinematics import SHAPES
 from mpam_calib.physics.statics import axial_lever, hoop_lever, strains
@@ -78,6 +78,7 @@ def rows(setting: Setting, count: int = 60) -> Readings:
         test_cycle=cycle + 3.0 * (share > 0.5),
         travel=1e-6 + rng.permutation(share) * setting.stroke,
         reversal=np.where(share > 0.2, 1.0, 0.0),
+        strokes_before=np.full((count, 2), FAR),
         speed=SPEED * 10.0 ** (2.0 * rng.permutation(share) - 1.0),
         behind=rng.permutation(share) * setting.stroke,
         pace=SPEED * 10.0 ** (2.0 * rng.permutation(share) - 1.0),
@@ -98,6 +99,7 @@ def middle(setting: Setting, **away: float) -> Readings:
         "test_cycle": 1.0,
         "travel": 0.02 * setting.stroke,
         "reversal": 1.0,
+        "strokes_before": (FAR, FAR),
         "speed": SPEED,
         "pace": SPEED,
         "behind": 0.0,

@@ -9,6 +9,7 @@ import pytest
 from model import build
 
 from mpam_calib.model.blueprint import draw_blueprint
+from mpam_calib.model.readings import FAR
 from mpam_calib.posterior.bins import bin_loops
 from mpam_calib.posterior.row_motion import row_readings
 from mpam_calib.specimen.recording import Loops
@@ -72,6 +73,17 @@ def test_cycles_of_the_test_go_on_from_level_to_level():
     np.testing.assert_array_equal(found, expected)
     bins = bin_loops(both)
     assert set(bins.readings.test_cycle) == set(range(1, 9))
+
+
+def test_a_stroke_knows_the_lengths_of_the_two_before_it():
+    """Of whatever level: 12 mm between turns, a level's last up to its last reading."""
+    made = build.loops((100.0, 150.0), 12.0, 12, cycles=2)
+    first, _ = made.strokes
+    before = row_readings(made).strokes_before[first]
+    whole, short = (pytest.approx(way, abs=1e-6) for way in (12e-3, 11.5e-3))
+    lengths = [whole, whole, whole, short, whole, whole, whole]
+    assert before[:, 0].tolist() == [FAR, *lengths]
+    assert before[:, 1].tolist() == [FAR, FAR, *lengths[:-1]]
 
 
 def test_travel_of_a_sudden_turn():

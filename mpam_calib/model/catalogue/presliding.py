@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mpam_calib.model.curves import STEEPEST
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, Normal, Parameter
+from mpam_calib.model.readings import FAR
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
@@ -97,15 +98,26 @@ def _turning(
     """Friction that turns over, on a level's ``first`` stroke by so much and so much ``quicker``.
 
     With ``once`` that is the test's very first stroke alone: the others begin where the level before ended.
+    A stroke too short for full friction hands on what it reached; strokes alike, one after the other, each
+    turn 2/(1 + left(stroke)) over.
     """
 
     def apply(state: State, values: Values, setting: Setting) -> State:
         readings = state.readings
-        reversal = np.where(readings.test_cycle > 1.0, 1.0, readings.reversal) if once else readings.reversal
+        later = readings.test_cycle > 1.0
+        reversal = np.where(later, 1.0, readings.reversal) if once else readings.reversal
+
+        def left_after(travel: Array) -> Array:
+            moved = replace(readings, travel=travel, reversal=reversal)
+            return left(replace(state, readings=moved), values)
+
+        one, two = readings.strokes_before.T
+        second = (readings.cycle == 1.0) & (~later if once else True)
+        before = np.where(second, first, AGAINST / (1.0 + np.where(two < FAR, left_after(two), 0.0)))
+        missing = np.where(one < FAR, left_after(one) * before, 0.0)
+        swing = first + (AGAINST - missing - first) * reversal
         travel = readings.travel * (quicker + (1.0 - quicker) * reversal)
-        turned = replace(state, readings=replace(readings, travel=travel, reversal=reversal))
-        swing = first + (AGAINST - first) * reversal
-        return replace(state, sign=state.sign * (1.0 - swing * left(turned, values)))
+        return replace(state, sign=state.sign * (1.0 - swing * left_after(travel)))
 
     return apply
 
