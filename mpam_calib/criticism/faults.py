@@ -12,6 +12,7 @@ from mpam_calib.criticism.fit import Fit
 from mpam_calib.criticism.hum import hum_rms
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.repeat import raw_residual, repeating_rms
+from mpam_calib.criticism.wave import wave_rms
 from mpam_calib.model.noise import grown
 
 REPEAT_SIZE = 0.2
@@ -53,6 +54,6 @@ def faults_of(problem: Problem, fitted: Fit) -> Faults:
         repeating=repeating if repeating > REPEAT_SIZE * noise.total else 0.0,
         # Tails that were declared are no bursts.
         bursts=0.0 if problem.blueprint.noise.robust else bursts_rms(rows, residual, grows),
-        hum=hum_rms(rows, residual),
+        hum=max(hum_rms(rows, residual), wave_rms(rows, residual)),
         step=coarse_step(rows.force, noise.total),
     )

@@ -2,7 +2,7 @@
 
 Near the end of its range its readings lack more and more of large forces, as if the fixture gave, the wall
 were thinner or an order of the moduli missing: causes that a search names where it has no other word for it.
-Zeroed anew at every level it passes for a crosshead that is.
+With a zero or a gain of its own at every level it passes for a crosshead zeroed anew.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from mpam_calib.criticism.search import Search
 from mpam_calib.model.effect import effect
 
 FAULT = "load_cell"
-ZEROED, CROSSHEAD_ZEROED = "load_cell:zeroed", "length_offset:rezeroed"
-"""A zero for each level, tried where the leading set has one of the crosshead's."""
+ZEROED, RESCALED, CROSSHEAD_ZEROED = "load_cell:zeroed", "load_cell:rescaled", "length_offset:rezeroed"
+"""A zero or a gain for each level, tried where the leading set has a zero of the crosshead's."""
 KNEES = (0.3, 0.6, 0.85)
 """Shares of the largest reading at which a load cell begins to give way where climbs begin."""
 FAR = 3.0
@@ -42,7 +42,7 @@ NO_RIVAL = Rival(-np.inf, frozenset())
 def load_cell_rival(found: Search, leading: Set) -> Rival:
     """A fault alone, or in place of some of the leading set's causes: at least as plain as that set."""
     chosen = found.fits[leading, found.best_size(leading)].effects
-    faults = (FAULT, ZEROED) if CROSSHEAD_ZEROED in chosen else (FAULT,)
+    faults = (FAULT, ZEROED, RESCALED) if CROSSHEAD_ZEROED in chosen else (FAULT,)
     return max((_rival(found, leading, fault) for fault in faults), key=lambda rival: rival.lead)
 
 
@@ -69,7 +69,7 @@ def _tries(found: Search, beside: Set, size: int, fault: str) -> list[Try]:
     forms, start = (
         (tuple(sorted(beside)), {}) if known is None else (tuple(sorted(known.effects)), ended(known))
     )
-    if fault == ZEROED:
+    if fault != FAULT:
         return [((*forms, fault), start)]
     setting = found.problem.model.setting
     assert setting is not None

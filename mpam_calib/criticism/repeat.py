@@ -74,13 +74,14 @@ def repeating_rms(rows: Rows, residual: Array) -> float:
 
 
 def _detrended(rows: Rows, residual: Array, here: NDArray[np.bool_]) -> list[tuple[Array, Array]]:
-    """Places (m) and residuals (N) of each stroke of a branch, without its turns and a smooth curve."""
+    """Places (m) and residuals (N) of each stroke of a branch, without turns, rests and a smooth curve."""
     found = []
     for s in np.unique(rows.stroke[here]):
         inside = np.flatnonzero(rows.stroke == s)
         x = rows.readings.displacement[inside]
-        # Next to a turn the crosshead hardly moves, and its friction is nobody's model.
+        # Next to a turn the crosshead hardly moves, at rest not at all: its friction is nobody's model.
         away = np.abs(x - 0.5 * (x.min() + x.max())) < 0.5 * AWAY * np.ptp(x)
+        away &= ~rows.rest[inside]
         if away.sum() >= FEWEST:
             inside, x = inside[away], x[away]
             found.append((x, residual[inside] - Polynomial.fit(x, residual[inside], DEGREE)(x)))

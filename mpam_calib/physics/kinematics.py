@@ -69,6 +69,16 @@ def wall_at_constant_volume(L: Array, R: Array, rest: Rest) -> Array:
     return R - np.sqrt(np.maximum(R**2 - section, 0.0))
 
 
+def wall_of_a_thin_bladder(L: Array, R: Array, rest: Rest) -> Array:
+    """Wall thickness (m) whose volume is reckoned as that of a thin wall: t = t0 R0 L0 / (R L)."""
+    return rest.t0 * rest.R0 * rest.L0 / (R * L)
+
+
+def wall_as_at_rest(L: Array, R: Array, rest: Rest) -> Array:
+    """Wall thickness (m) that stays what it was at rest."""
+    return rest.t0 + np.zeros_like(R)
+
+
 def radius_constant_thickness(L: Array, rest: Rest) -> Array:
     """Outer radius (m) of a bladder of constant volume and constant thickness (thesis Eq. 4.16)."""
     section = rest.L0 * (2.0 * rest.R0 * rest.t0 - rest.t0**2) / L
@@ -77,15 +87,19 @@ def radius_constant_thickness(L: Array, rest: Rest) -> Array:
 
 def shape_inextensible_braid(L: Array, rest: Rest) -> Shape:
     """R from Eq. 2.10, t from the constant wall volume (Eq. 2.6), T from Eq. 4.15."""
+    return _shape_of_the_braid(L, rest, "inextensible_braid")
+
+
+def _shape_of_the_braid(L: Array, rest: Rest, kinematics: str) -> Shape:
     sin2 = sin_braid_angle(L, rest) ** 2
     R = _radius_of_the_braid(sin2, rest)
-    return Shape(L, R, wall_at_constant_volume(L, R, rest), _tan2(sin2))
+    return Shape(L, R, WALLS[kinematics](L, R, rest), _tan2(sin2))
 
 
 def shape_constant_thickness(L: Array, rest: Rest) -> Shape:
     """R from Eq. 4.16, t = t0, T from Eq. 4.15: the thesis's own simulation."""
     R = radius_constant_thickness(L, rest)
-    return Shape(L, R, rest.t0 + np.zeros_like(R), tan2_braid_angle(L, rest))
+    return Shape(L, R, wall_as_at_rest(L, R, rest), tan2_braid_angle(L, rest))
 
 
 def swollen(shape: Shape, rest: Rest, factor: Array) -> Shape:
@@ -111,8 +125,7 @@ def with_longer_strands(shape: Shape, rest: Rest, kinematics: str, strain: Array
     if kinematics == "constant_thickness":
         return Shape(shape.L, shape.R, shape.t, T)
     R = shape.R * np.sqrt(np.maximum(longer - sin2, 0.0) / (1.0 - sin2))
-    kept = kinematics == "braid_of_constant_thickness"
-    return Shape(shape.L, R, shape.t if kept else wall_at_constant_volume(shape.L, R, rest), T)
+    return Shape(shape.L, R, WALLS[kinematics](shape.L, R, rest), T)
 
 
 def tip_shortened_length(L: Array, R: Array, rest: Rest, factor: Array) -> Array:
@@ -122,17 +135,28 @@ def tip_shortened_length(L: Array, R: Array, rest: Rest, factor: Array) -> Array
 
 def shape_braid_of_constant_thickness(L: Array, rest: Rest) -> Shape:
     """R from Eq. 2.10, t = t0, T from Eq. 4.15: a wall that keeps its thickness within the strands."""
-    sin2 = sin_braid_angle(L, rest) ** 2
-    R = _radius_of_the_braid(sin2, rest)
-    return Shape(L, R, rest.t0 + np.zeros_like(R), _tan2(sin2))
+    return _shape_of_the_braid(L, rest, "braid_of_constant_thickness")
 
+
+def shape_braid_of_thin_wall(L: Array, rest: Rest) -> Shape:
+    """R from Eq. 2.10, t = t0 R0 L0 / (R L), T from Eq. 4.15: the volume as of a thin wall."""
+    return _shape_of_the_braid(L, rest, "braid_of_thin_wall")
+
+
+WALLS = {
+    "inextensible_braid": wall_at_constant_volume,
+    "braid_of_constant_thickness": wall_as_at_rest,
+    "braid_of_thin_wall": wall_of_a_thin_bladder,
+}
+"""The wall's thickness where the braid sets the radius."""
 
 SHAPES = {
     "inextensible_braid": shape_inextensible_braid,
     "constant_thickness": shape_constant_thickness,
     "braid_of_constant_thickness": shape_braid_of_constant_thickness,
+    "braid_of_thin_wall": shape_braid_of_thin_wall,
 }
-"""The two kinematics by their declared names, and one that an effect asks for."""
+"""The two kinematics by their declared names, and two that an effect asks for."""
 
 NEWTON_STEPS = 6
 FLATTEST = 0.1

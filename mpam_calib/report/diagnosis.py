@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mpam_calib.criticism.diagnose import Diagnosis
-from mpam_calib.criticism.load_cell import ZEROED
+from mpam_calib.criticism.load_cell import FAULT, RESCALED, ZEROED
 from mpam_calib.criticism.verdict import BESIDE
 from mpam_calib.model.bend import FORM, is_bend
 from mpam_calib.model.effect import effect
@@ -149,6 +149,20 @@ def _against(gain: dict[str, Any], which: str, elpd: str, such: str) -> str:
     return "; ".join(against)
 
 
+CELL_FAULTS = {
+    FAULT: ("that shows less and less of large forces", "load it with dead weights up to the blocked force"),
+    ZEROED: (
+        "whose zero differs from level to level",
+        "look at it with the muscle unhooked, before and after each level",
+    ),
+    RESCALED: (
+        "whose gain differs from level to level",
+        "hang one dead weight on it before and after each level, and look at its plug and its range",
+    ),
+}
+"""What a load cell does that explains the readings, and how to look at it."""
+
+
 def _left(content: dict[str, Any]) -> list[str]:
     """What no set of causes removes."""
     found = []
@@ -166,19 +180,17 @@ def _left(content: dict[str, Any]) -> list[str]:
         )
     if content["hum_N"] > 0.0:
         size = significant(content["hum_N"])
-        found.append(f"a hum of {size} N, one frequency in all strokes: mains, a pump, a loose shield?")
+        found.append(
+            f"a hum of {size} N, one frequency in all strokes: mains, a pump, a loose shield, "
+            "a regulator that hunts?"
+        )
     if content["step_N"] > 0.0:
         size = significant(content["step_N"])
         found.append(f"forces are recorded in steps of {size} N, coarser than their noise: use a finer range")
     if content["load_cell_nats"] is not None:
         by = "better" if content["load_cell_nats"] > 0.0 else "nearly as well"
-        found.append(
-            f"a load cell whose zero differs from level to level explains the readings {by}: look at it with "
-            "the muscle unhooked, before and after each level"
-            if content["load_cell_fault"] == ZEROED
-            else f"a load cell that shows less and less of large forces explains the readings {by}: load it "
-            "with dead weights up to the blocked force"
-        )
+        cell, look = CELL_FAULTS[content["load_cell_fault"]]
+        found.append(f"a load cell {cell} explains the readings {by}: {look}")
     elif content["remainder_N"] > 0.0 or not found:
         size = significant(content["remainder_N"])
         found.append(f"structure of {size} N is left beside every set tried")

@@ -31,7 +31,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(EFFECT_IDS, ("bent",)),
     "dead_band": ("bent", "soft", "power", "closing"),
     "tip_shape": ("bent", "working", "power", "round", "tapered", "volume"),
-    "braid_kinematics": ("bent", "swell", "thickness"),
+    "braid_kinematics": ("bent", "swell", "thickness", "thin"),
     "braid_angle": ("bent", "seating"),
     "braid_stretch": ("bent", "power", "longer", "both"),
     "wall_pressure": ("bent", "thick", "pressed"),
@@ -63,7 +63,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "pressure_droop": (
         *("bent", "level", "level-bent", "power", "level-power"),
-        *("loss", "speed", "lagging", "volume", "reservoir", "refill"),
+        *("loss", "speed", "lagging", "play", "throttle", "volume", "reservoir", "refill"),
     ),
     "rig_compliance": ("bent", "power", "toe", "preload"),
     "law_shape": ("bent", "exponential"),

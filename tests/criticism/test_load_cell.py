@@ -84,13 +84,17 @@ def test_a_fixture_that_gives_is_no_load_cell(name: str, truth: set[str]) -> Non
     assert load_cell_rival(found, verdict.leading).lead < -10.0
 
 
+@pytest.mark.parametrize("zero", [True, False])
 @pytest.mark.parametrize("name", ["develop-null-001", "develop-null-007"])
-def test_a_cell_s_zero_at_one_level_is_no_crosshead_s(name: str) -> None:
-    """Ten times the noise, constant over one level's readings."""
+def test_a_cell_s_zero_or_gain_at_one_level_is_no_crosshead_s(name: str, zero: bool) -> None:
+    """Ten times the noise, constant over one level's readings or in proportion to them."""
     specimen = specimen_of(name)
     loops = specimen.loops
     assert loops is not None
     off = 10.0 * problem_of(specimen).noise_level.total * (loops.level == 1)
+    if not zero:
+        here = loops.force_N[loops.level == 1]
+        off = -off * loops.force_N / np.sqrt(np.mean(here**2))
     problem = problem_of(replace(specimen, loops=replace(loops, force_N=loops.force_N + off)))
     verdict = judge(search(problem, ("length_offset", *RIVALS)))
     assert (verdict.word, verdict.standing) == ("unexplained", frozenset())

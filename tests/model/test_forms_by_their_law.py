@@ -46,6 +46,40 @@ def test_a_supply_that_is_shut_off_follows_boyle(droop: float) -> None:
     assert float(lost[0, 0]) == pytest.approx(droop, rel=1e-9)
 
 
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.3])
+def test_a_supply_with_play_follows_as_a_loose_gear_does(share: float) -> None:
+    """The place is pushed along from either side of a gap, step by step; at rest it lay in the middle."""
+    setting = setting_for("pressure_droop:play")
+    readings = driven(setting)
+    play, place, pushed = share * setting.stroke, 0.0, []
+    for x in readings.displacement:
+        place = min(max(place, x - play), x + play)
+        pushed.append(place)
+    values = {"droop_percent": one(0.08), "supply_play_mm": one(play)}
+    state = effect("pressure_droop:play").apply(start(setting, readings), values, setting)
+    found = (1.0 - state.pressure[0] / readings.pressure) / 0.08
+    np.testing.assert_allclose(found, np.array(pushed) / setting.stroke, atol=0.01)
+
+
+@pytest.mark.parametrize("vented", [0.0, 1.0])
+def test_a_throttle_loses_by_the_flow(vented: float) -> None:
+    """In proportion to d(πR²L)/dt; on the way back as much the other way, or nothing where it is vented."""
+    setting = setting_for("pressure_droop:throttle")
+    readings = driven(setting, strokes=2)
+    before = start(setting, readings)
+    values = {"droop_percent": one(0.08), "vented_share": one(vented)}
+    state = effect("pressure_droop:throttle").apply(before, values, setting)
+    lost = 1.0 - state.pressure[0] / readings.pressure
+    length = np.ravel(before.rest.L0 - before.displacement)
+    volume = np.ravel(np.pi * radius_inextensible_braid(length, before.rest) ** 2 * length)
+    flow = np.gradient(volume) * np.where(readings.sign < 0.0, 1.0, vented)
+    inside = np.abs(readings.displacement / setting.stroke - 0.5) < 0.45
+    ratio = lost[inside] / flow.max()
+    np.testing.assert_allclose(
+        ratio, ratio.max() * flow[inside] / flow[inside].max(), atol=5e-3 * ratio.max()
+    )
+
+
 @pytest.mark.parametrize("exponent", [0.0, 0.5])
 def test_what_a_supply_loses_may_be_the_same_at_every_pressure(exponent: float) -> None:
     """Or go with its root; as ever in proportion to the stroke."""

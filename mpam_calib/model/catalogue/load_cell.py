@@ -1,4 +1,4 @@
-"""A load cell that gives way near the end of its range, or whose zero differs from level to level.
+"""A load cell that gives way near the end of its range, or whose zero or gain differs from level to level.
 
 No cause of the contract's, and never named: whoever sees it has to look at the cell, not at the muscle. But
 what it explains must not pass for the muscle's doing.
@@ -52,6 +52,21 @@ def _zeros(setting: Setting) -> tuple[Parameter, ...]:
     )
 
 
+def _rescaled(state: State, values: Values, setting: Setting) -> State:
+    """The cell's gain is another at every level (a loose plug, a range switched over)."""
+    gains = [np.asarray(values[p.name]) for p in _gains(setting)]
+    table = np.concatenate([*gains, sum(gains) / len(gains)], axis=-1)
+    return replace(state, gain=state.gain * (1.0 + table[..., state.readings.level]))
+
+
+def _gains(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LongTailed(0.05)
+    return tuple(
+        Parameter(f"cell_gain_{i}", prior, f"gain at level {i}, from the lowest, less 1", unit="")
+        for i in range(1, len(setting.levels) + 1)
+    )
+
+
 register(
     Effect(
         id="load_cell",
@@ -64,10 +79,13 @@ register(
         apply=_apply,
         memory=False,
         uses_force=True,
-        forms={"zeroed": _zeroed},
-        own={"zeroed": _zeros},
-        leading={"zeroed": 0},
-        sources={"zeroed": "textbook: repeatability of a zero, an error of its own for each level"},
+        forms={"zeroed": _zeroed, "rescaled": _rescaled},
+        own={"zeroed": _zeros, "rescaled": _gains},
+        leading={"zeroed": 0, "rescaled": 0},
+        sources={
+            "zeroed": "textbook: repeatability of a zero, an error of its own for each level",
+            "rescaled": "textbook: repeatability of a gain, an error of its own for each level",
+        },
         fault=True,
     )
 )

@@ -18,8 +18,10 @@ Array = NDArray[np.float64]
 
 MOST_LOST = 0.9
 """Of the pressure above a vacuum, however large the droop."""
-LAG_SHARE, NO_WAY, NO_PLACE = 0.1, 1e-12, 1e-9
-"""A supply's typical lag over a stroke's time; a way and a place (m) as good as none."""
+LAG_SHARE, PLAY_SHARE, FLOW_STEP = 0.1, 0.1, 1e-3
+"""A supply's typical lag over a stroke's time, its play over the stroke, and a step that tells a slope."""
+NO_WAY, NO_PLACE = 1e-12, 1e-9
+"""A way and a place (m) as good as none."""
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -81,6 +83,36 @@ def _flow_exponent(setting: Setting) -> tuple[Parameter, ...]:
 def _lagging(state: State, values: Values, setting: Setting) -> State:
     """The droop follows the stroke with a lag τ: v·τ behind it, gradually after a turn (at one speed v)."""
     return _drooped(state, values, _place(state, values) / setting.stroke)
+
+
+def _play(state: State, values: Values, setting: Setting) -> State:
+    """The droop follows the stroke with play: it stays at each turn until twice the play is passed."""
+    play, readings = values["supply_play_mm"], state.readings
+    behind = np.minimum(readings.travel - play * readings.reversal, play)
+    place = np.maximum(state.displacement + readings.sign * behind, 0.0)
+    return _drooped(state, values, place / setting.stroke)
+
+
+def _play_way(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LogNormal(PLAY_SHARE * setting.stroke, 0.7)
+    return (Parameter("supply_play_mm", prior, "half the stroke that turns before the supply does", ""),)
+
+
+def _throttle(state: State, values: Values, setting: Setting) -> State:
+    """Lost with the flow that the volume's growth asks for; on the way back too much, in part or whole."""
+    step = FLOW_STEP * setting.stroke
+
+    def growth(place: Array) -> Array:
+        return _filled(place + step, state, setting) - _filled(place - step, state, setting)
+
+    flow = growth(state.displacement) / growth(np.full((1, 1), 0.5 * setting.stroke))
+    way = np.where(state.readings.sign < 0.0, 1.0, -values["vented_share"])
+    return _drooped(state, values, 0.5 * way * flow * over_mean(state.readings.speed, setting))
+
+
+def _vented(setting: Setting) -> tuple[Parameter, ...]:
+    prior = Normal(0.5, 0.4)
+    return (Parameter("vented_share", prior, "of the loss, that the way back shows the other way", "", ""),)
 
 
 def _volume(state: State, values: Values, setting: Setting) -> State:
@@ -165,21 +197,26 @@ register(
             "loss": _loss,
             "speed": _speed,
             "lagging": _lagging,
+            "play": _play,
+            "throttle": _throttle,
             "volume": _volume,
             "reservoir": _reservoir,
             "refill": _refill,
         },
         own=dict.fromkeys(("power", "level-power"), _exponent)
         | dict.fromkeys(("lagging", "volume"), _lag)
-        | {"loss": _loss_exponent, "speed": _flow_exponent, "refill": _refill_time},
-        recalls=("speed", "lagging", "volume", "refill"),
+        | {"loss": _loss_exponent, "speed": _flow_exponent, "refill": _refill_time}
+        | {"play": _play_way, "throttle": _vented},
+        recalls=("speed", "lagging", "play", "throttle", "volume", "refill"),
         sources={
             "power": "textbook: quadratic in the stroke; near 0.8 in proportion to the muscle's volume",
             "level-power": "the same over each level's own stroke",
             "loss": "textbook: a loss that is the same at every pressure, or goes with its root (orifice)",
             "speed": "line losses: Hagen-Poiseuille ∝ flow, turbulent or orifice ∝ flow²",
             "lagging": "textbook: first-order lag of a regulator or a line, τ·dy/dt + y = x",
-            "volume": "the same of the muscle's volume πR²L in place of its stroke",
+            "play": "textbook: a regulator's hysteresis, as the play of a gear (backlash)",
+            "throttle": "line loss in proportion to the flow, P − R·dV/dt, which a vent relieves in part",
+            "volume": "a lag of the muscle's volume πR²L in place of its stroke",
             "reservoir": "Boyle's law of a supply that is shut off: (P + P_atm)·V = constant",
             "refill": "mass balance of a muscle behind a throttle: dq/dt = dV/dt − q/τ, q ≥ 0",
         },
