@@ -110,6 +110,18 @@ def test_a_ripple_of_the_drive_repeats(null: tuple[Problem, Fit]) -> None:
     assert found == pytest.approx(size, rel=0.35)
 
 
+def test_friction_that_fades_at_rests_half_way_does_not_repeat(null: tuple[Problem, Fit]) -> None:
+    """The same while the crosshead moves is a notch that every stroke has."""
+    problem, fitted = null
+    assert problem.rows is not None
+    place = problem.rows.readings.displacement / problem.rows.readings.displacement.max()
+    held = np.abs(place - 0.4) < 0.03
+    faded = np.where(held, -5.0 * problem.noise_level.total * problem.rows.readings.sign, 0.0)
+    residual = left(problem, fitted) + faded
+    assert repeating_rms(replace(problem.rows, rest=held), residual) == 0.0
+    assert repeating_rms(problem.rows, residual) > 0.0
+
+
 @pytest.mark.parametrize("one_in", [2, 3])
 def test_a_ripple_is_told_by_short_strokes_together(one_in: int) -> None:
     """Of thirty or twenty readings each, at places of their own: none could tell it alone."""
