@@ -24,6 +24,8 @@ DEGREE = 6
 """Degree, along the way, of the curve that strokes alike share."""
 FINER, PADDED = 2, 2
 """Places in the spectrum's time for each time step, and the length of that time over the test's."""
+MOST = 2_000_000
+"""Places at the most."""
 BEGIN, BESIDE = 4, 40
 """Frequencies on either side with which one is compared, from where to where, in those the test resolves."""
 SURE = 1e-9
@@ -37,12 +39,14 @@ def wave_rms(rows: Rows, residual: Array) -> float:
 
     ``residual`` (rows,) is what a fit leaves, N. What strokes alike share at a place is taken out, and each
     stroke's mean and slope; the periodogram of the rest (Schuster 1898), all strokes on one clock, is
-    compared with itself on either side.
+    compared with itself on either side. A pause as long as the test, or files whose clocks nothing ties
+    together, can hide a wave; they make none.
     """
     time, left, strokes = _rest_of(rows, residual)
     if strokes < 2 * ALIKE or not np.any(left):
         return 0.0
-    step = float(np.median(np.diff(time))) / FINER
+    # After a pause of days the spectrum's time has coarser places: there would be too many.
+    step = max(float(np.median(np.diff(time))) / FINER, float(time[-1] - time[0]) / MOST)
     if step <= 0.0:
         return 0.0
     place = np.round((time - time[0]) / step).astype(np.int64)

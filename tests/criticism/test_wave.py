@@ -69,6 +69,18 @@ def test_a_wave_is_found_with_its_size(rows: Rows, each: float) -> None:
     assert wave_rms(rows, noise_of("white", rows, 7) + 0.2 * wave(rows, each)) == 0.0
 
 
+@pytest.mark.parametrize("pause", [3.0, 1e4, 1e9])
+def test_a_pause_makes_no_waves_and_a_short_one_hides_none(rows: Rows, pause: float) -> None:
+    """So many strokes' times between the two halves of a test; the wave keeps time all along."""
+    later = rows.stroke > np.median(rows.stroke)
+    time = rows.readings.time + pause * stroke_s(rows) * later
+    paused = replace(rows, readings=replace(rows.readings, time=time))
+    noise = noise_of("white", rows, 5)
+    assert wave_rms(paused, noise) == 0.0
+    if pause < 10.0:
+        assert wave_rms(paused, noise + 4.0 * wave(paused, 3.4)) == pytest.approx(4.0, rel=0.2)
+
+
 def test_what_differs_from_cycle_to_cycle_is_no_wave(rows: Rows) -> None:
     """A bend along the way in first cycles alone, or less with each, many times the noise."""
     place = rows.readings.displacement / rows.readings.displacement.max()
