@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 FEWEST, ALIKE = 6, 2
 """Readings of a stroke that is looked at, and strokes of a level and branch that tell what they share."""
+FEWEST_STROKES = 20
+"""Strokes that resolve a line: in twelve the spectrum of slow noise may be as narrow as one."""
 AWAY = 0.9
 """Middle share of a stroke that is looked at."""
 DEGREE = 6
@@ -43,7 +45,7 @@ def wave_rms(rows: Rows, residual: Array) -> float:
     together, can hide a wave; they make none.
     """
     time, left, strokes = _rest_of(rows, residual)
-    if strokes < 2 * ALIKE or not np.any(left):
+    if strokes < FEWEST_STROKES or not np.any(left):
         return 0.0
     # After a pause of days the spectrum's time has coarser places: there would be too many.
     step = max(float(np.median(np.diff(time))) / FINER, float(time[-1] - time[0]) / MOST)

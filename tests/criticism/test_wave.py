@@ -53,6 +53,16 @@ def test_noise_makes_no_waves(rows: Rows, filtered: str) -> None:
         assert wave_rms(rows, noise * (1.0 + rows.stroke % 3)) == 0.0
 
 
+@pytest.mark.parametrize("filtered", ["resonant", "second order", "second order, slow"])
+def test_slow_noise_in_any_number_of_strokes_is_no_wave(rows: Rows, filtered: str) -> None:
+    """In few of them a single frequency may hold much of it by chance."""
+    for levels in range(1, int(rows.readings.level.max()) + 2):
+        few = np.flatnonzero(rows.readings.level < levels)
+        short = Rows(rows.readings.take(few), rows.force[few], rows.stroke[few], rows.rest[few])
+        for seed in range(60):
+            assert wave_rms(short, noise_of(filtered, short, seed)) == 0.0
+
+
 @pytest.mark.parametrize("name", NULLS)
 def test_what_a_rig_without_a_wave_records_has_none(name: str) -> None:
     problem = problem_of(specimen_of(name))
@@ -62,11 +72,11 @@ def test_what_a_rig_without_a_wave_records_has_none(name: str) -> None:
 
 @pytest.mark.parametrize("each", [2.1, 3.4])
 def test_a_wave_is_found_with_its_size(rows: Rows, each: float) -> None:
-    """Twice and four times as large as the noise; a fifth of it does not matter."""
+    """Twice and four times as large as the noise; two fifths of it do not matter, however sure."""
     for size in (2.0, 4.0):
         found = wave_rms(rows, noise_of("white", rows, 7) + size * wave(rows, each))
         assert found == pytest.approx(size, rel=0.2)
-    assert wave_rms(rows, noise_of("white", rows, 7) + 0.2 * wave(rows, each)) == 0.0
+    assert wave_rms(rows, noise_of("white", rows, 7) + 0.4 * wave(rows, each)) == 0.0
 
 
 @pytest.mark.parametrize("pause", [3.0, 1e4, 1e9])
