@@ -21,8 +21,6 @@ DEGREE = 6
 """Degree of the curve that is taken out of each stroke."""
 FEWEST = 10
 """Readings of a stroke that is long enough to be looked at."""
-AWAY = 0.9
-"""Middle share of a stroke that is looked at."""
 TOGETHER, FINEST = 8, 400
 """Readings that share a place on average, and the largest number of places."""
 SHIFTS = 200
@@ -77,13 +75,9 @@ def _detrended(rows: Rows, residual: Array, here: NDArray[np.bool_]) -> list[tup
     """Places (m) and residuals (N) of each stroke of a branch, without turns, rests and a smooth curve."""
     found = []
     for s in np.unique(rows.stroke[here]):
-        inside = np.flatnonzero(rows.stroke == s)
-        x = rows.readings.displacement[inside]
-        # Next to a turn the crosshead hardly moves, at rest not at all: its friction is nobody's model.
-        away = np.abs(x - 0.5 * (x.min() + x.max())) < 0.5 * AWAY * np.ptp(x)
-        away &= ~rows.rest[inside]
-        if away.sum() >= FEWEST:
-            inside, x = inside[away], x[away]
+        inside = rows.middle(s)
+        if len(inside) >= FEWEST:
+            x = rows.readings.displacement[inside]
             found.append((x, residual[inside] - Polynomial.fit(x, residual[inside], DEGREE)(x)))
     return found
 

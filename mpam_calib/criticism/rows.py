@@ -20,6 +20,8 @@ MOST_ROWS = 40_000
 """Raw readings that are kept: whole strokes, from the first on."""
 MOST_STROKES, MOST_POINTS = 90, 600
 """Strokes, and static readings, that are looked at: what a search costs grows with their cube."""
+MIDDLE = 0.9
+"""Share of a stroke's way that is away from its turns."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,16 @@ class Rows:
         index = np.flatnonzero(keep)
         readings, rest = rows_and_rest(loops)
         return Rows(readings.take(index), loops.force_N[index], loops.stroke[index], rest[index])
+
+    def middle(self, stroke: int) -> NDArray[np.intp]:
+        """Indices of a stroke's readings away from its turns and rests.
+
+        Next to a turn the crosshead hardly moves, at rest not at all: its friction is nobody's model.
+        """
+        inside = np.flatnonzero(self.stroke == stroke)
+        x = self.readings.displacement[inside]
+        away = np.abs(x - 0.5 * (x.min() + x.max())) < 0.5 * MIDDLE * np.ptp(x)
+        return np.asarray(inside[away & ~self.rest[inside]])
 
 
 def _slack(loops: Loops) -> NDArray[np.bool_]:

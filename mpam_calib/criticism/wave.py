@@ -20,8 +20,6 @@ FEWEST, ALIKE = 6, 2
 """Readings of a stroke that is looked at, and strokes of a level and branch that tell what they share."""
 FEWEST_STROKES = 20
 """Strokes that resolve a line: in twelve the spectrum of slow noise may be as narrow as one."""
-AWAY = 0.9
-"""Middle share of a stroke that is looked at."""
 DEGREE = 6
 """Degree, along the way, of the curve that strokes alike share."""
 FINER, PADDED = 2, 2
@@ -74,10 +72,8 @@ def _rest_of(rows: Rows, residual: Array) -> tuple[Array, Array, int]:
     """Times (s) and residuals (N) of the readings that are looked at, less what is no wave; their strokes."""
     readings = rows.readings
     alike: dict[tuple[int, float], list[NDArray[np.intp]]] = {}
-    for s in np.unique(rows.stroke[~rows.rest]):
-        inside = np.flatnonzero((rows.stroke == s) & ~rows.rest)
-        x = readings.displacement[inside]
-        inside = inside[np.abs(x - 0.5 * (x.min() + x.max())) < 0.5 * AWAY * np.ptp(x)]
+    for s in np.unique(rows.stroke):
+        inside = rows.middle(s)
         if len(inside) >= FEWEST:
             key = int(readings.level[inside[0]]), float(readings.sign[inside[0]])
             alike.setdefault(key, []).append(inside)
