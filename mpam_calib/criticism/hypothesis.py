@@ -19,11 +19,11 @@ from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.priors import Parameter
+from mpam_calib.posterior.algebra import LOG_2PI
 from mpam_calib.posterior.mode import LOOSEST, Mode, climb, curvature, evaluate
 
 Array = NDArray[np.float64]
 
-LOG_2PI = float(np.log(2.0 * np.pi))
 NEWTON_REACH = 0.5
 """Standard deviations over which differences are taken."""
 NEWTON_STEPS, NEWTON_GAIN, SHORTER = 6, 0.005, (1.0, 0.5, 0.2, 0.05)

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from mpam_calib.criticism.hypothesis import HARSHEST, LOG_2PI, Hypothesis
+from mpam_calib.criticism.hypothesis import HARSHEST, Hypothesis
 from mpam_calib.criticism.rates import Rates
 from mpam_calib.posterior.adaptive import error_of, weigh_adaptively
+from mpam_calib.posterior.algebra import LOG_2PI
 from mpam_calib.posterior.effective import effective_share
 from mpam_calib.posterior.evidence import Evidence
 from mpam_calib.posterior.mode import Mode, evaluate

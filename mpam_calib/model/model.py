@@ -105,6 +105,14 @@ def build_model(blueprint: Blueprint) -> Model:
     return Model(blueprint, setting, chain, moduli, tensile, remainder, tuple(extra))
 
 
+def _root(covariance: Array) -> Array:
+    """A square root (k, k) of a covariance, whose moduli may move as one (then it is singular)."""
+    sd = np.sqrt(np.diagonal(covariance))
+    scale = np.where(sd > 0.0, sd, 1.0)
+    power, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * axes * np.sqrt(np.maximum(power, 0.0)))
+
+
 def _moduli(blueprint: Blueprint, setting: Setting | None, tensile: TensileModel | None) -> ModuliBlock:
     """The moduli's block with the prior that the declaration asks for."""
     simulation, material = blueprint.simulation, blueprint.material
@@ -116,8 +124,9 @@ def _moduli(blueprint: Blueprint, setting: Setting | None, tensile: TensileModel
         return ModuliBlock(Law("constant", len(mean), levels), 0.0, mean=mean, root=root)
     if material is not None:
         mean = np.array(material.mean)
-        root = np.asarray(np.linalg.cholesky(np.array(material.covariance)), dtype=np.float64)
-        return ModuliBlock(Law("constant", len(mean), levels), 0.0, mean=mean, root=root)
+        return ModuliBlock(
+            Law("constant", len(mean), levels), 0.0, mean=mean, root=_root(np.array(material.covariance))
+        )
     if tensile is not None:
         law = Law("constant", tensile.order, levels)
         return ModuliBlock(law, tensile.scale, grid=(np.zeros(1), tensile.grid()))

@@ -3,28 +3,44 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+LOG_2PI = float(np.log(2.0 * np.pi))
+
 
 def solve(matrix: Array, right: Array) -> Array:
-    """x (B, k) of matrix (B, k, k) · x = right (B, k)."""
-    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0], dtype=np.float64)
+    """x (B, k) of matrix (B, k, k) · x = right (B, k); nan where the matrix is singular."""
+    try:
+        return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0], dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return np.asarray((inverse(matrix) @ right[..., None])[..., 0], dtype=np.float64)
 
 
 def cholesky(matrix: Array) -> Array:
     """Cholesky factors; nan for a matrix that rounding has made indefinite (its density counts as 0)."""
+    return _each(np.linalg.cholesky, matrix)
+
+
+def inverse(matrix: Array) -> Array:
+    """Inverses; nan for a matrix that is singular to rounding (its density counts as 0)."""
+    return _each(np.linalg.inv, matrix)
+
+
+def _each(function: Callable[..., Array], matrix: Array) -> Array:
+    """The function of all matrices (..., k, k) at once, or of one after the other where some are at fault."""
     try:
-        return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+        return np.asarray(function(matrix), dtype=np.float64)
     except np.linalg.LinAlgError:
-        factor = np.full_like(matrix, np.nan)
+        result = np.full_like(matrix, np.nan)
         for index in np.ndindex(matrix.shape[:-2]):
             with contextlib.suppress(np.linalg.LinAlgError):
-                factor[index] = np.linalg.cholesky(matrix[index])
-        return factor
+                result[index] = function(matrix[index])
+        return result
 
 
 def log_determinant(factor: Array) -> Array:

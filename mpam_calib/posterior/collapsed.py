@@ -21,10 +21,10 @@ from mpam_calib.model.model import CONTRACTION_SD, Model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
-from mpam_calib.posterior.algebra import condense, log_determinant, solve_transposed
+from mpam_calib.posterior.algebra import LOG_2PI, condense, log_determinant, solve_transposed
 from mpam_calib.posterior.bins import SLACK_ABOVE, LoopBins
 from mpam_calib.posterior.covariance import StrokeCovariance, fast_noise_covariance, fast_noise_log_likelihood
-from mpam_calib.posterior.piece import LOG_2PI, Piece, forget, segment_piece, total, white_piece
+from mpam_calib.posterior.piece import Piece, forget, segment_piece, total, white_piece
 from mpam_calib.posterior.points import Points, TensilePoints
 from mpam_calib.posterior.scatter import Scatter
 from mpam_calib.posterior.sites import FreeRows, Sites, chunk_log_likelihood, usual_chunks

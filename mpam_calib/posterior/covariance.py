@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mpam_calib.posterior.algebra import cholesky, inverse, log_determinant
 from mpam_calib.posterior.bins import LoopBins
 from mpam_calib.posterior.markov import Parts
 
@@ -228,8 +229,7 @@ def fast_noise_log_likelihood(
 def scatter_log_likelihood(total: Array, chunks: int, covariance: Array) -> Array:
     """Log-likelihood (B,) of so many chunks with the sum of squares ``total`` (dof, dof), given a covariance
     (B, dof, dof) of each."""
-    factor = np.linalg.cholesky(covariance)
-    log_det = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)
-    trace = np.trace(np.linalg.solve(covariance, total[None]), axis1=1, axis2=2)
+    log_det = log_determinant(cholesky(covariance))
+    trace = np.sum(inverse(covariance) * total.T, axis=(1, 2))
     result: Array = -0.5 * (chunks * (log_det + len(total) * np.log(2.0 * np.pi)) + trace)
     return result

@@ -7,11 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.posterior.algebra import cholesky, log_determinant
+from mpam_calib.posterior.algebra import LOG_2PI, cholesky, inverse, log_determinant
 
 Array = NDArray[np.float64]
-
-LOG_2PI = float(np.log(2.0 * np.pi))
 
 
 class Piece(NamedTuple):
@@ -60,8 +58,7 @@ def segment_piece(
     m = covariance.shape[-1]
     log_dets = log_determinant(cholesky(covariance))
     log_det = log_dets @ np.bincount(kind, minlength=covariance.shape[1])
-    inverse = np.linalg.inv(covariance)[:, kind]
-    weighted = (inverse @ padded.reshape(B, -1, m, width)).reshape(padded.shape)
+    weighted = (inverse(covariance)[:, kind] @ padded.reshape(B, -1, m, width)).reshape(padded.shape)
     full = np.swapaxes(padded, 1, 2) @ weighted
     piece = Piece(full[:, :-1, :-1], full[:, :-1, -1], full[:, -1, -1] + log_det + rows * LOG_2PI)
     return piece, weighted

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.posterior.algebra import cholesky, log_determinant
+from mpam_calib.posterior.algebra import LOG_2PI, cholesky, log_determinant
 from mpam_calib.posterior.markov import Parts, factor, whiten
 
 Array = NDArray[np.float64]
-
-LOG_2PI = float(np.log(2.0 * np.pi))
 
 
 @dataclass(frozen=True)

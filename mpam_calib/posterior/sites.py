@@ -20,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, special, stats
 
+from mpam_calib.posterior.algebra import LOG_2PI, cholesky, log_determinant
+
 Array = NDArray[np.float64]
 
-LOG_2PI = float(np.log(2.0 * np.pi))
 LEAST = 0.02
 """Smallest curvature of a site: a fiftieth of a Gaussian row's."""
 LEAST_SHARE = 0.3
@@ -109,11 +110,10 @@ def usual_chunks(chunks: Array, force: Array) -> NDArray[np.bool_]:
 
 def chunk_log_likelihood(covariance: Array, chunks: Array, grown: Array) -> Array:
     """Log-likelihood (B,) of chunks (c, dof) under covariances (B, dof, dof) times grown² (B or 1, c)."""
-    factor = np.linalg.cholesky(covariance)
+    factor = cholesky(covariance)
     white = np.linalg.solve(factor, np.broadcast_to(chunks.T, (len(factor), *chunks.T.shape)))
     squares = np.sum(np.sum(white**2, axis=1) / grown**2, axis=1)
     dof = chunks.shape[1]
-    log_det = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)
     growth = 2.0 * dof * np.sum(np.log(np.broadcast_to(grown, (len(factor), len(chunks)))), axis=1)
-    result: Array = -0.5 * (len(chunks) * (log_det + dof * LOG_2PI) + growth + squares)
+    result: Array = -0.5 * (len(chunks) * (log_determinant(factor) + dof * LOG_2PI) + growth + squares)
     return result

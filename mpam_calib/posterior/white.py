@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.algebra import LOG_2PI
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-LOG_2PI = float(np.log(2.0 * np.pi))
 ALIKE = 3e-4
 """Share of the highest pressure by which those of strokes that repeat each other may differ."""
 

@@ -19,6 +19,7 @@ MATERIAL = MaterialPosterior(
     mean=(4e4, 1.0 / 3.0), covariance=((1e6, 0.1), (0.1, 7.0)), strain_range=(0.0, 1.0), convention="stretch"
 )
 TENSILE = Tensile(np.linspace(-0.1, 2.0, 30), np.linspace(-1e3, 1e5, 30))
+ONE_FACTOR = (1.128e6, 27050.0, 3.1)
 CASES = {
     "loops": build.blueprint({"law": "linear", "order": 4}),
     "everything": build.blueprint(
@@ -134,3 +135,22 @@ def test_noise_is_declared() -> None:
         declared = build.blueprint({"law": "linear", "order": 2}, noise=noise)
         assert Blueprint.model_validate_json(declared.model_dump_json()) == declared
         assert set(build_model(declared).names) - before == added
+
+
+@pytest.mark.parametrize("rel_sd", [0.3, 0.0])
+def test_moduli_that_move_as_one_keep_their_covariance(rel_sd: float) -> None:
+    """A run with declared E_Pa leaves one common factor: a singular covariance."""
+    mean = np.array(ONE_FACTOR)
+    covariance = rel_sd**2 * np.outer(mean, mean)
+    left = MaterialPosterior(
+        mean=ONE_FACTOR,
+        covariance=tuple(map(tuple, covariance.tolist())),
+        strain_range=None,
+        convention="stretch",
+    )
+    declared = {"moduli": "run:other", "order": 3, "law": "constant"}
+    model = build_model(build.blueprint(declared, material=left))
+    assert model.moduli is not None
+    found, (_, root) = model.moduli.mean, model.moduli.transform({})
+    np.testing.assert_allclose(found, mean)
+    np.testing.assert_allclose(root[0] @ root[0].T, covariance, rtol=1e-9)

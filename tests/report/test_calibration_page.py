@@ -213,6 +213,14 @@ def test_density_shows_something_of_draws_over_many_decades() -> None:
     assert np.trapezoid(found, x) == pytest.approx(1.0, abs=0.05)
 
 
+def test_density_is_zero_where_no_draw_is_near() -> None:
+    """A posterior eight prior sds away is far from all draws of the prior that it is drawn over."""
+    draws = np.random.default_rng(4).normal(size=4000)
+    for away in (-9.0, 9.0, 1e6):
+        assert not density.density(draws, np.linspace(away - 0.1, away + 0.1, 240)).any()
+    assert density.density(draws, np.linspace(2.9, 3.1, 240)).min() > 0.0
+
+
 def test_mass_levels_hold_their_mass() -> None:
     rng = np.random.default_rng(2)
     _, _, height = density.joint_density(*rng.normal(size=(2, 20_000)))

@@ -25,6 +25,8 @@ def density(draws: Floats, at: Floats) -> Floats:
     h = max(0.9 * scale * len(x) ** -0.2, float(np.ptp(at)) / len(at))
     # a histogram much finer than the bandwidth stands in for the draws: cost no longer grows with them
     low, high = max(float(x.min()), float(at.min())), min(float(x.max()), float(at.max()))
+    if low - high >= 8.0 * h:
+        return np.zeros(len(at))  # no draw is anywhere near
     edges = np.linspace(low - 4 * h, high + 4 * h, 513)
     counts = np.histogram(x, edges)[0]
     centres = 0.5 * (edges[1:] + edges[:-1])
