@@ -28,6 +28,7 @@ from mpam_calib.posterior.bins import LoopBins, bin_loops
 from mpam_calib.posterior.covariance import StrokeCovariance
 from mpam_calib.posterior.points import gather_points
 from mpam_calib.specimen.recording import Specimen
+from mpam_calib.specimen.summary import noise_within
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -38,6 +39,8 @@ HALF_WAVES = 24
 SIZES = (0.0, 0.002, 0.008, 0.03)
 """Sizes of the remainder as shares of the force scale."""
 SIZE_PRIOR = (0.7, 0.1, 0.1, 0.1)
+NOISE_UNKNOWN = 1e-3
+"""Noise of a reading (N) where there are too few to tell it and no sensor sd is declared."""
 STROKE_SHARE = 0.35
 """Size of each stroke's own part of the remainder, as a share of the common part."""
 PRESSURE_LENGTH = 0.08
@@ -257,7 +260,8 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         n = len(bins)
         keep = np.flatnonzero(~bins.slack & np.isin(bins.segment, looked_at))
         if noise is None:
-            guess = model.setting.force_sd or _from_differences(bins.force, bins.segment)
+            found = np.nan_to_num(noise_within(bins.force, bins.segment), nan=NOISE_UNKNOWN)
+            guess = model.setting.force_sd or float(found)
             noise = NoiseLevel(guess, 0.0, 1.0)
         layout = StrokeCovariance.build(bins)
         if noise.reading:
@@ -333,13 +337,6 @@ def _held(bins: LoopBins, keep: Ints) -> tuple[Array, Array]:
     together = (1.0 - APART) * ((segment[:, None] == segment) & (sign[:, None] == sign))
     own = (1.0 - ALIKE) * doubt[:, None] * doubt * (together + APART * np.eye(len(doubt)))
     return own, shared
-
-
-def _from_differences(force: Array, segment: Ints) -> float:
-    """Noise sd from second differences within strokes (robust), N."""
-    second = np.diff(force, 2)
-    inside = (segment[2:] == segment[1:-1]) & (segment[1:-1] == segment[:-2])
-    return float(1.4826 * np.median(np.abs(second[inside])) / np.sqrt(6.0)) if inside.any() else 1e-3
 
 
 def _kernel(problem: Problem, own_share: float = STROKE_SHARE) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
-from mpam_calib.posterior.bins import beyond_floor
+from mpam_calib.posterior.floor import pulling
 from mpam_calib.posterior.points import Points
 from mpam_calib.posterior.row_motion import rows_and_rest
 from mpam_calib.specimen.recording import Loops
@@ -39,9 +39,7 @@ class Rows:
     @staticmethod
     def of(loops: Loops) -> Rows:
         """The first strokes of the loops."""
-        clear = loops.clear
-        keep = np.ones(len(loops.force_N), dtype=bool) if loops.unclear is None else ~loops.unclear
-        keep[keep] = ~(_slack(clear) | beyond_floor(clear, clear.strokes[0]))
+        keep = pulling(loops)
         if len(keep) > MOST_ROWS:
             keep = keep & (loops.stroke < loops.stroke[MOST_ROWS])
         index = np.flatnonzero(keep)
@@ -57,15 +55,6 @@ class Rows:
         x = self.readings.displacement[inside]
         away = np.abs(x - 0.5 * (x.min() + x.max())) < 0.5 * MIDDLE * np.ptp(x)
         return np.asarray(inside[away & ~self.rest[inside]])
-
-
-def _slack(loops: Loops) -> NDArray[np.bool_]:
-    """Readings (rows,) from a stroke's first slack one to its last: noise lifts some off the floor."""
-    first, length = loops.strokes
-    index = np.arange(len(loops.stroke))
-    begin = np.minimum.reduceat(np.where(loops.censored, index, len(index)), first)
-    end = np.maximum.reduceat(np.where(loops.censored, index, -1), first)
-    return np.asarray((index >= np.repeat(begin, length)) & (index <= np.repeat(end, length)))
 
 
 def telling_strokes(loops: Loops) -> Ints:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.floor import beyond_floor
 from mpam_calib.posterior.row_motion import rows_and_rest
 from mpam_calib.posterior.white import Nodes
 from mpam_calib.specimen.recording import Loops
@@ -34,8 +35,8 @@ REST_BINS = 0.2
 """Bins of a stroke's rest, at most, for each one of its motion."""
 SLACK_SHARE = 0.2
 """A bin with this share of its readings at or below the floor says "slack", not a value."""
-SLACK_SDS, SLACK_ABOVE = 5.0, 4.5
-"""Sds of noise that slack readings stay below: above a typical flagged one, and above the floor."""
+SLACK_ABOVE = 4.5
+"""Sds of noise above the floor that slack readings stay below."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
         rest, rows = rest[clear], rows.take(np.flatnonzero(clear))
         loops = loops.clear
     stroke_starts, lengths = loops.strokes
-    beyond = beyond_floor(loops, stroke_starts)
+    beyond = beyond_floor(loops)
     per_stroke = [
         np.union1d(_edges(part, most, finest), np.flatnonzero(np.diff(slack, prepend=slack[0])))
         for part, slack in zip(
@@ -202,22 +203,6 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
         averaged=loops.averaged,
         nodes=repeated or Nodes.build(loops.force_N, rows, _wider(starts, segment, position, most)),
     )
-
-
-def beyond_floor(loops: Loops, stroke_starts: Ints) -> NDArray[np.bool_]:
-    """Rows at the slack end of their stroke: none further contracted reads clearly more than the floor.
-
-    A bin that holds pulling and slack readings is neither; and of few slack readings all may lie above it, so
-    that a stroke ends without a flag.
-    """
-    if not loops.censored.any():
-        return np.zeros(len(loops.force_N), dtype=bool)
-    segment = np.repeat(np.arange(len(stroke_starts)), np.diff(np.append(stroke_starts, len(loops.force_N))))
-    second = np.diff(loops.force_N, 2)[segment[2:] == segment[:-2]]
-    noise = float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0)) if len(second) else 0.0
-    pulls = loops.force_N > np.median(loops.force_N[loops.censored]) + SLACK_SDS * noise
-    last = np.maximum.reduceat(np.where(pulls, loops.displacement_m, -np.inf), stroke_starts)
-    return np.asarray((loops.displacement_m > last[segment]) & (np.abs(loops.branch) == 1))
 
 
 def _beyond_slack(

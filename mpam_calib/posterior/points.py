@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.floor import lifted_by_noise
 from mpam_calib.specimen.recording import Specimen, Tensile
 
 Array = NDArray[np.float64]
@@ -17,7 +18,8 @@ TENSILE_POINTS = 400
 
 @dataclass(frozen=True)
 class Points:
-    """Points (n,): ``force`` in N; ``censored`` where only "at or below the floor" is known.
+    """Points (n,): ``force`` in N; ``censored`` where only "at or below the floor" is known, also those that
+    noise lifts above it.
 
     ``kind`` is 0 for a force map, 1 for a blocked force, 2 for a free contraction (a force of zero
     at a measured contraction, whose own noise enters through the curve's slope).
@@ -48,7 +50,7 @@ def gather_points(specimen: Specimen) -> Points | None:
     """All points of a specimen, or None."""
     if specimen.geometry is None:
         return None
-    L0 = specimen.geometry.L0
+    L0, floor = specimen.geometry.L0, specimen.sensors.force_floor_N
     readings: list[Readings] = []
     force: list[Array] = []
     censored: list[NDArray[np.bool_]] = []
@@ -64,10 +66,14 @@ def gather_points(specimen: Specimen) -> Points | None:
         sign = np.where(np.abs(grid.branch) == 1, grid.branch, 0).astype(np.float64)
         rows = Readings.at_rest(grid.pressure_Pa, grid.contraction * L0, sign)
         rows = Readings(**{**rows.__dict__, "level": grid.level})
-        add(rows, grid.force_N, grid.censored, 0)
+        curve = np.unique(np.stack([grid.level, grid.branch]), axis=1, return_inverse=True)[1]
+        lifted = lifted_by_noise(grid.force_N, grid.contraction, curve, grid.censored, floor)
+        add(rows, grid.force_N, grid.censored | lifted, 0)
     if (blocked := specimen.blocked_force) is not None:
         rows = Readings.at_rest(blocked.pressure_Pa, np.zeros_like(blocked.pressure_Pa))
-        add(rows, blocked.force_N, blocked.censored, 1)
+        one = np.zeros(len(blocked.force_N), dtype=np.int64)
+        lifted = lifted_by_noise(blocked.force_N, -blocked.pressure_Pa, one, blocked.censored, floor)
+        add(rows, blocked.force_N, blocked.censored | lifted, 1)
     if (free := specimen.free_contraction) is not None:
         rows = Readings.at_rest(free.pressure_Pa, free.contraction * L0)
         add(rows, np.zeros_like(free.contraction), np.zeros(len(free.contraction), dtype=bool), 2)

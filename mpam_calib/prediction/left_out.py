@@ -20,6 +20,7 @@ from mpam_calib.model.remainder import ROUGH
 from mpam_calib.posterior.batch import batch_size
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.draws import Draws
+from mpam_calib.posterior.floor import pulling
 from mpam_calib.posterior.mode import climb_modes, evaluate
 from mpam_calib.posterior.points import KINDS
 from mpam_calib.posterior.row_motion import row_readings
@@ -92,10 +93,7 @@ def _held(specimen: Specimen, target: Collapsed, level: int) -> _Held | None:
     force: list[Array] = []
     averaged: list[Array] = []
     if (loops := specimen.loops) is not None:
-        kept = (loops.level == level) & ~loops.censored
-        if loops.unclear is not None:
-            kept &= ~loops.unclear
-        index = np.flatnonzero(kept)
+        index = np.flatnonzero(pulling(loops) & (loops.level == level))
         places.append(row_readings(loops).take(index))
         force.append(loops.force_N[index])
         averaged.append(np.full(len(index), float(loops.averaged)))

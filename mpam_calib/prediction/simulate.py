@@ -225,8 +225,8 @@ def _record_map(
     readings = replace(readings, level=grid.level)
     force = model.chain.force(values, eta, readings)[0]
     floor = specimen.sensors.force_floor_N
-    slack = np.zeros(len(force), dtype=bool) if floor is None else force <= floor
     held = force if floor is None else np.maximum(force, floor)
     assert model.setting is not None
     reading = held + _noise(held, None, values, model.setting.force_scale, rng)
-    return replace(grid, force_N=np.where(slack, held, reading), censored=slack)
+    censored = np.zeros(len(force), dtype=bool) if floor is None else reading <= floor
+    return replace(grid, force_N=reading, censored=censored)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpam_calib.specimen.motion import run_starts
-from mpam_calib.specimen.recording import BRANCH_WORDS, Floats, Loops
+from mpam_calib.specimen.recording import BRANCH_WORDS, Floats, Ints, Loops
 from mpam_calib.units import KPA, MINUTE, MM
 
 SPEED_SHARE = 0.1
@@ -102,13 +102,17 @@ def sampling_rates(loops: Loops) -> tuple[float, ...]:
 
 
 def force_noise(loops: Loops) -> float:
-    """White noise of one force reading, N.
+    """White noise of one force reading, N, by strokes."""
+    return noise_within(loops.force_N, loops.stroke) * math.sqrt(loops.averaged)
 
-    From second differences within strokes, where slow changes cancel; nan without three rows.
+
+def noise_within(values: Floats, group: Ints) -> float:
+    """Sd of white noise (robust) of values (n,) in groups of neighbours (n,).
+
+    From second differences, where slow changes cancel; nan without three values of a group.
     """
-    inside = loops.stroke[2:] == loops.stroke[:-2]
-    second = np.abs(np.diff(loops.force_N, n=2))[inside]
+    inside = (group[2:] == group[1:-1]) & (group[1:-1] == group[:-2])
+    second = np.abs(np.diff(values, n=2))[inside]
     if not len(second):
         return math.nan
-    sd = 1.4826 * float(np.median(second)) / math.sqrt(6.0)  # 1, -2, 1: six variances
-    return sd * math.sqrt(loops.averaged)
+    return 1.4826 * float(np.median(second)) / math.sqrt(6.0)  # 1, -2, 1: six variances

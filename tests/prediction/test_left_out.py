@@ -86,6 +86,22 @@ def test_rows_that_are_means_have_the_noise_of_means(sound):
     assert abs(table["inside90"].mean() - 0.90) < 0.05
 
 
+def test_readings_that_noise_lifts_above_a_floor_are_foreseen_by_nobody(sound):
+    """The same test, driven on until every level is slack: its table is that of the readings that pull."""
+    loops = sound.specimen.loops
+    floor = float(np.quantile(loops.force_N, 0.3))
+    noise = 0.1 * np.random.default_rng(2).standard_normal(len(loops.force_N))
+    force = np.where(loops.force_N < floor, floor + noise, loops.force_N)
+    held = replace(loops, force_N=force, censored=force <= floor)
+    clipped = replace(
+        sound.specimen, loops=held, sensors=sound.specimen.sensors.model_copy(update={"force_floor_N": floor})
+    )
+    table = told(calibrate(clipped))
+    pulls = told(sound)
+    assert (table["rmse_N"] < 1.5 * pulls["rmse_N"].max()).all()
+    assert abs(table["inside90"].mean() - 0.90) < 0.06
+
+
 def test_nothing_to_leave_out(sound):
     specimen = sound.specimen
     free = replace(specimen, simulation=specimen.simulation.model_copy(update={"law": "free"}))
