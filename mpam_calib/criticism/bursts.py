@@ -2,7 +2,7 @@
 
 A muscle's force, and whatever is wrong with it, is smooth along a stroke away from its turns, and comes back
 in the next one. A loose plug does neither. Nor is it noise, whose means over a few readings keep to a normal
-distribution; it would only make the noise seem larger than it is.
+distribution, or have tails that fall away gradually; it would only make the noise seem larger than it is.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import ndimage, stats
 
 from mpam_calib.criticism.rows import Rows
 
@@ -27,6 +27,9 @@ WIDTHS = (1, 3, 6)
 """Consecutive readings that are looked at together."""
 OUTSTANDING = 6.0
 """Standard deviations of such means beyond which readings are no noise: one in 5·10⁸."""
+HALF_WAY, FEWER = 3.0, 3.0
+"""Standard deviations from which on readings are less far out, and how many of them tails have for each
+that stands out; of Student's t with five degrees of freedom fifteen, of spikes one or none."""
 SIZE = 0.2
 """Root mean square of them all, in the noise's sd, below which they do not matter."""
 SD = 1.4826
@@ -47,7 +50,10 @@ def bursts_rms(rows: Rows, residual: Array, sd: Array) -> float:
     own = [piece - usual for alike in groups for piece, usual in zip(alike, _of_others(alike), strict=True)]
     stand_out = np.zeros(len(every), dtype=bool)
     for width in WIDTHS:
-        here, beside = (np.concatenate([_mean(piece, width) for piece in kind]) for kind in (left, own))
+        most = np.inf if width == 1 else OUTSTANDING * SD * float(np.median(np.abs(every)))
+        here, beside = (np.concatenate([_mean(piece, width, most) for piece in kind]) for kind in (left, own))
+        if width == 1 and _tails(here):
+            continue
         least = OUTSTANDING * SD * np.median(np.abs(here))
         high = (np.abs(here) > least) & (np.abs(beside) > least) & (here * beside > 0.0)
         stand_out |= ndimage.maximum_filter1d(high, width)
@@ -56,9 +62,20 @@ def bursts_rms(rows: Rows, residual: Array, sd: Array) -> float:
     return share * float(np.mean(sd)) if share > SIZE * noise else 0.0
 
 
-def _mean(piece: Array, width: int) -> Array:
-    """Means over some consecutive readings."""
-    return np.asarray(ndimage.uniform_filter1d(piece, width, mode="constant"))
+def _tails(every: Array) -> bool:
+    """Whether the readings (n,) that stand out are the ends of long tails, as of Student's t.
+
+    Tails fall away gradually: for each reading far out there are many less far out. Of spikes there are not.
+    """
+    size = np.abs(every) / (SD * np.median(np.abs(every)))
+    less = np.sum((size > HALF_WAY) & (size <= OUTSTANDING)) - len(every) * 2.0 * stats.norm.sf(HALF_WAY)
+    return bool(less > FEWER * np.sum(size > OUTSTANDING))
+
+
+def _mean(piece: Array, width: int, most: float) -> Array:
+    """Means over some consecutive readings, of which none counts for more than the ``most``: it would be a
+    burst by itself."""
+    return np.asarray(ndimage.uniform_filter1d(np.clip(piece, -most, most), width, mode="constant"))
 
 
 def _strokes(rows: Rows, residual: Array) -> list[list[Array]]:

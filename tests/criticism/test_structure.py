@@ -268,6 +268,32 @@ def test_bursts_stand_out_of_short_and_long_strokes(name: str, one_in: int) -> N
         assert least * added < bursts_rms(problem.rows, loud, sd) < 1.2 * added
 
 
+@pytest.mark.parametrize("name", NULLS)
+@pytest.mark.parametrize("freedom", [5, 8])
+def test_long_tails_are_no_bursts_and_hide_none(name: str, freedom: int) -> None:
+    """Student's t, 20 draws each: two at most have neighbours far out; bursts among it are seen."""
+    problem = problem_of(specimen_of(name))
+    assert problem.rows is not None
+    n, total = len(problem.rows.force), problem.noise_level.total
+    sd = np.ones(n)
+    added = np.subtract(*in_bursts(problem, 15.0 * total, 1)[::-1])
+    draws = [total * np.random.default_rng(seed).standard_t(freedom, n) for seed in range(20)]
+    assert sum(bursts_rms(problem.rows, noise, sd) > 0.0 for noise in draws) <= 2
+    assert all(bursts_rms(problem.rows, noise + added, sd) > 0.0 for noise in draws)
+
+
+@pytest.mark.parametrize("name", NULLS)
+def test_lone_spikes_are_bursts(name: str) -> None:
+    """One reading in a hundred, nothing beside it: the noise's own tails would not end so suddenly."""
+    problem = problem_of(specimen_of(name))
+    assert problem.rows is not None
+    residual = left(problem, fit(problem, frozenset(), 0))
+    rng = np.random.default_rng(3)
+    spikes = (rng.random(len(residual)) < 0.01) * rng.choice([-1.0, 1.0], len(residual))
+    spiked = residual + rng.uniform(10.0, 20.0, len(residual)) * problem.noise_level.total * spikes
+    assert bursts_rms(problem.rows, spiked, np.ones(len(residual))) > 0.0
+
+
 def test_what_comes_back_in_the_next_cycle_is_no_burst(null: tuple[Problem, Fit]) -> None:
     """However sharp: fine structure that repeats is told by another test."""
     problem, fitted = null
