@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 class MpamError(Exception):
-    """Base of every error that the package raises on purpose."""
+    """Base of every error that says what is wrong in files, options and data."""
 
 
 @dataclass

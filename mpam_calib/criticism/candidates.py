@@ -50,7 +50,7 @@ def _why_not(identifier: str, problem: Problem) -> str | None:
         return "no loops with both branches"
     if identifier in HISTORY and not problem.has_clock:
         return f"no clock in a {KINDS[0].replace('_', ' ')}"
-    if identifier == "stress_softening" and len(np.unique(problem.cycle)) < 2:
+    if identifier == "stress_softening" and len(problem.cycles) < 2:
         return "one cycle"
     if identifier == "rate_friction":
         # The speed of a stroke: within one it changes with the position, as much else does.

@@ -80,7 +80,7 @@ def measure_gain(
     None where nothing can be held out. ``tell`` hears the share done.
     """
     causes = causes_of(named)
-    cycles, levels = np.unique(problem.cycle), np.unique(problem.level)
+    cycles, levels = problem.cycles, np.unique(problem.level)
     by_cycle = len(cycles) >= FEWEST and (bool(causes & set(HISTORY)) or len(levels) < FEWEST)
     groups, labels = (problem.cycle, cycles) if by_cycle else (problem.level, levels)
     if len(labels) < FEWEST:

@@ -95,6 +95,11 @@ class Problem:
         assert self.model.setting is not None
         return self.model.setting.force_scale
 
+    @property
+    def cycles(self) -> Ints:
+        """The cycles of the loops; a static reading belongs to none."""
+        return np.unique(self.cycle[self.stroke >= 0])
+
     def __len__(self) -> int:
         return len(self.force)
 

@@ -11,11 +11,12 @@ from mpam_calib.specimen.recording import Specimen
 
 ORDERS = range(1, 7)
 LAWS = {"constant": 1, "linear": 2, "free": 2, "exponential": 3, "exponential_each": 4}
-"""Laws and the levels that each needs; a law after one that it holds as a special case."""
+"""Laws and the levels that each needs, if it is not the declared one; a law after one that it holds as a
+special case."""
 
 
 def model_space(specimen: Specimen) -> list[Simulation]:
-    """Every such simulation; the declared effects and the moduli's source are kept.
+    """Every such simulation, the declared one among them; its effects and the moduli's source are kept.
 
     A single modulus has the same exponential law whether rates are shared or not: it is there once.
     What a declared effect adds is not there a second time. Laws vary fastest and in the order of LAWS
@@ -26,8 +27,8 @@ def model_space(specimen: Specimen) -> list[Simulation]:
     parts = [p for p in (specimen.loops, specimen.force_map) if p is not None]
     if any(np.any(p.branch == 1) and np.any(p.branch == -1) for p in parts):
         frictions = ["coulomb", "none"] + (["strand"] if specimen.braid is not None else [])
-    orders: list[int] = list(ORDERS)
-    laws = [law for law, needed in LAWS.items() if len(specimen.levels_Pa) >= needed]
+    orders = sorted({*ORDERS, declared.order})
+    laws = [law for law, needed in LAWS.items() if len(specimen.levels_Pa) >= needed or law == declared.law]
     strains = ["engineering", "stretch"]
     if declared.moduli != "loops":
         orders, laws, strains = [declared.order], ["constant"], [declared.strain]

@@ -13,13 +13,12 @@ from mpam_calib.calibration import predict
 from mpam_calib.errors import InputError
 from mpam_calib.posterior.stored import load_run
 from mpam_calib.run.files import write_csv
+from mpam_calib.specimen.plausibility import HIGHEST_LEVEL_KPA
 from mpam_calib.units import KPA
 
 Array = NDArray[np.float64]
 
 OPTION = "--pressure"
-HIGHEST_KPA = 5000.0
-"""As with levels in data: more than this was meant in another unit."""
 MOST = 2000
 AT_ONCE = 8
 """Pressures predicted together: bounds the memory."""
@@ -47,8 +46,8 @@ def parse_pressures(text: str) -> Array:
     first, last, step = parts
     if not 0.0 <= first <= last or step <= 0.0:
         raise InputError(OPTION, found, expected)
-    if last > HIGHEST_KPA:
-        raise InputError(OPTION, found, f"pressures in kPa, at most {HIGHEST_KPA:g}")
+    if last > HIGHEST_LEVEL_KPA:
+        raise InputError(OPTION, found, f"pressures in kPa, at most {HIGHEST_LEVEL_KPA:g}")
     # Rounding must neither lose the last pressure nor double it.
     steps = (last - first) / step
     if steps >= MOST:

@@ -42,8 +42,8 @@ class Clock:
     def blocks(self) -> Iterator[pd.DataFrame]:
         """The file's blocks, readings that share a tick spread over it.
 
-        Raises ``InputError`` at a step back in time, and at the first repeated time where there are few, or
-        where most repeat the whole row.
+        Raises ``InputError`` at a step back in time, at the first repeated time where there are few, or
+        where most repeat the whole row, and where the time never changes.
         """
         rest: pd.DataFrame | None = None
         tick = 0.0
@@ -59,6 +59,9 @@ class Clock:
                 yield whole.iloc[:last].assign(time_s=spread_ticks(time[:last], float(time[last])))
         assert rest is not None  # a file without rows is refused
         self._refuse_slips()
+        if self.repeated and not tick:
+            found = f"{rest['time_s'].iloc[0]:.10g} in every row (a clock that stands still)"
+            raise InputError(self.file.label, found, EXPECTED, None, "time_s")
         start = float(rest["time_s"].iloc[0])
         yield rest.assign(time_s=spread_ticks(rest["time_s"].to_numpy(), start + (tick or 1.0)))
 

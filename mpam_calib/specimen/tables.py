@@ -51,10 +51,11 @@ RULES: Final[dict[str, Rule]] = {
 
 @dataclass(frozen=True)
 class TableSpec:
-    """A kind of data file: the columns it must have and those it may have."""
+    """A kind of data file: the columns it must have, those it may have, and those nothing is read from."""
 
     required: tuple[str, ...]
     optional: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -98,9 +99,10 @@ TABLES: Final[dict[FileKind, TableSpec]] = {
     "force_map": TableSpec(
         ("pressure_kPa", "contraction", "force_N"),
         ("branch", "censored"),
+        ("repeat",),
     ),
     "blocked_force": TableSpec(("pressure_kPa", "force_N"), ("censored",)),
     "free_contraction": TableSpec(("pressure_kPa", "contraction")),
     "tensile": TableSpec(("strain", "stress_Pa")),
 }
-"""What is read of each kind of file (``repeat`` of a force map is not: every repeat is a reading)."""
+"""What is read of each kind of file; every repeat of a force map is a reading, whatever its number."""

@@ -157,7 +157,7 @@ def _check_effects(source: TomlSource, declaration: Declaration) -> None:
 
 def _check_mapped_columns(source: TomlSource, declaration: Declaration) -> None:
     for kind in get_args(FileKind):
-        known = TABLES[kind].columns
+        known = TABLES[kind].columns + TABLES[kind].unread
         for name, column in declaration.columns.of(kind).items():
             keys = ["columns", kind, name]
             if name not in known:

@@ -132,6 +132,22 @@ def test_laws_in_play_are_those_that_the_levels_carry() -> None:
         assert {s.law for s in space.model_space(few)} == set(space.LAWS) - missing
 
 
+@pytest.mark.parametrize(
+    ("law", "order", "levels"),
+    [("exponential_each", 1, 3), ("exponential_each", 3, 3), ("linear", 8, 6), ("exponential", 1, 4)],
+)
+def test_the_declared_simulation_is_always_in_play(law: str, order: int, levels: int) -> None:
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
+    specimen = specimen_of(recipe.name)
+    declared = specimen.simulation.model_copy(update={"law": law, "order": order})
+    few = replace(specimen, levels_Pa=specimen.levels_Pa[:levels], simulation=declared)
+    models = space.model_space(few)
+    assert models.count(declared) == 1
+    # Of a single modulus one exponential law, by either name.
+    alone = {m.law for m in models if m.order == 1}
+    assert len(alone & {"exponential", "exponential_each"}) == 1
+
+
 def test_what_an_effect_adds_is_not_there_twice() -> None:
     """An extended model declares the friction and the kinematics that it found as effects."""
     recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")

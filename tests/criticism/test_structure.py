@@ -12,6 +12,7 @@ from scipy import stats
 
 from mpam_calib.criticism import structure
 from mpam_calib.criticism.bursts import bursts_rms
+from mpam_calib.criticism.candidates import candidates
 from mpam_calib.criticism.converter import coarse_step
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import Problem
@@ -317,6 +318,18 @@ def test_a_converter_coarser_than_the_noise_is_seen(name: str, steps: float, see
     with_steps = float(np.hypot(noise, step / np.sqrt(12.0)))
     assert coarse_step(force, with_steps) == pytest.approx(step if seen else 0.0, rel=0.01)
     assert coarse_step(loops.force_N, noise) == 0.0
+
+
+def test_static_readings_are_no_cycle_of_the_loops(specimen: Specimen) -> None:
+    """One cycle and blocked forces are one cycle: nothing can soften from one to the next."""
+    assert specimen.loops is not None
+    levels = specimen.levels_Pa
+    blocked = BlockedForce(levels, np.linspace(10.0, 40.0, len(levels)), np.zeros(len(levels), dtype=bool))
+    one = specimen.loops.without(specimen.loops.cycle > 1)
+    problem = problem_of(replace(specimen, loops=one, blocked_force=blocked))
+    assert len(np.unique(problem.cycle)) == 2
+    assert problem.cycles.tolist() == [1]
+    assert dict(candidates(problem).not_tested)["stress_softening"] == "one cycle"
 
 
 def test_blocked_forces_belong_to_their_levels(specimen: Specimen, monkeypatch: pytest.MonkeyPatch) -> None:

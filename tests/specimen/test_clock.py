@@ -58,6 +58,14 @@ def test_rows_written_twice_are_refused(tmp_path: Path) -> None:
         read(folder)
 
 
+@pytest.mark.parametrize("time", [0.0, 17.5])
+def test_a_clock_that_stands_still_is_refused(tmp_path: Path, time: float) -> None:
+    made = recording()
+    folder = make(tmp_path, loops=replace(made, time=np.full(len(made.time), time)).text())
+    with pytest.raises(InputError, match=rf"loops\.csv:time_s: found {time:g} in every row"):
+        read(folder)
+
+
 def test_a_single_repeat_and_a_step_back_are_refused(tmp_path: Path) -> None:
     made = recording()
     again, back = made.time.copy(), made.time.copy()

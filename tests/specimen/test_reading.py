@@ -155,12 +155,13 @@ tensile = "tensile.csv"
 
 def test_every_kind_of_file_and_one_list_of_levels(tmp_path: Path) -> None:
     declaration = DECLARATION.replace('loops = "loops.csv"', 'loops = "loops.csv"' + STATIC)
+    declaration += '\n[columns.force_map]\nrepeat = "no"\n'
     specimen = read(
         make(
             tmp_path,
             declaration,
             loops=loops((50.0, 100.0)).text(),
-            force_map="pressure_kPa,contraction,force_N,branch,censored,repeat\n"
+            force_map="pressure_kPa,contraction,force_N,branch,censored,no\n"
             "50.4,0.0,12,,0,1\n50.4,0.1,6,loading,0,1\n200,0.0,50,unloading,0,1\n200,0.2,0,,1,1\n",
             blocked_force="pressure_kPa,force_N\n10,0\n300,70\n",
             free_contraction="pressure_kPa,contraction\n50,0.1\n100,0.2\n",
