@@ -6,6 +6,7 @@ These are the tasks of a search's workers, which hold the problem.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy import linalg
 
 from mpam_calib.criticism.doubt import DOUBTS
 from mpam_calib.criticism.fit import Fit, fit
-from mpam_calib.criticism.forms import equations_of, forms_of, price
+from mpam_calib.criticism.forms import equations_of, flexible, forms_of, price
 from mpam_calib.criticism.spread import held_problem
 
 Set = frozenset[str]
@@ -82,9 +83,18 @@ def _with(found: Fit, form: str) -> tuple[str, ...]:
 
 def with_better_forms(found: Fit) -> Fit:
     """The fit with its forms changed one at a time."""
+    return _one_at_a_time(found, forms_of)
+
+
+def with_better_kinds(found: Fit) -> Fit:
+    """The same among the forms that hold most shapes alone."""
+    return _one_at_a_time(found, flexible)
+
+
+def _one_at_a_time(found: Fit, choice: Callable[[str], tuple[str, ...]]) -> Fit:
     best = found
     for e in sorted(named_forms(found)):
-        for form in forms_of(e):
+        for form in choice(e):
             best = _better(best, _with(best, form), found.size, ended(best)) or best
     return best
 

@@ -28,6 +28,7 @@ from mpam_calib.criticism.refits import (
     ended,
     named_forms,
     with_better_forms,
+    with_better_kinds,
     with_doubt,
     with_doubted_equations,
 )
@@ -47,7 +48,7 @@ LEADING_SHARE = 3
 PARTNERS = 8
 """Best single effects that are tried as partners of every kept set."""
 SCREENED = 20
-"""Sets of three that straight lines along the pairs promise most of."""
+"""Further sets of three, of those that straight lines along the pairs promise most of."""
 LARGEST = 3
 CARRIED = 60
 """Leading sets that go on once the noise is settled."""
@@ -186,6 +187,11 @@ class Search:
         self.polished |= {k: f.effects == self.fits[k].effects for k, f in better.items()}
         self.fits.update(better)
 
+    def bend_all(self, keys: Iterable[tuple[Set, int]]) -> None:
+        """Change one bent form of a set at a time: its parts had theirs to make up for what they lacked."""
+        todo = [k for k in keys if k in self.fits]
+        self.fits.update(zip(todo, self.spread(with_better_kinds, [self.fits[k] for k in todo]), strict=True))
+
     def polish_near(self) -> None:
         """Polish all that may yet lead: in the bent forms of the search a true set may trail some nats."""
         near = [s for s in self.sets[:POLISHED] if self.score(s) > self.score(self.sets[0]) - NEAR]
@@ -315,8 +321,10 @@ def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
             found.refit_all((effects, size) for effects in sorted(tries, key=sorted))
         if k == LARGEST and width >= WIDTH:
             # A kept set may hold a stand-in for two causes, whose own pairs all trail behind it.
-            screened = promising(found.problem, found.fits, tested, k - 1)[:SCREENED]
-            found.refit_all((effects, 0) for effects in screened)
+            screened = promising(found.problem, found.fits, tested, k - 1)
+            new = [s for s in screened if (s, 0) not in found.fits][:SCREENED]
+            found.refit_all((effects, 0) for effects in new)
+            found.bend_all((effects, 0) for effects in new)
         tell(0.4 if k == 2 else 0.75)
         kept = _keep(found, k, width)
         for size in every:

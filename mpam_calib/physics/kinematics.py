@@ -74,6 +74,11 @@ def wall_of_a_thin_bladder(L: Array, R: Array, rest: Rest) -> Array:
     return rest.t0 * rest.R0 * rest.L0 / (R * L)
 
 
+def wall_of_a_thin_section(L: Array, R: Array, rest: Rest) -> Array:
+    """Wall thickness (m) that keeps the section of a thin wall, as if no length changed: t = t0 R0 / R."""
+    return rest.t0 * rest.R0 / R
+
+
 def wall_as_at_rest(L: Array, R: Array, rest: Rest) -> Array:
     """Wall thickness (m) that stays what it was at rest."""
     return rest.t0 + np.zeros_like(R)
@@ -143,10 +148,16 @@ def shape_braid_of_thin_wall(L: Array, rest: Rest) -> Shape:
     return _shape_of_the_braid(L, rest, "braid_of_thin_wall")
 
 
+def shape_braid_of_thin_section(L: Array, rest: Rest) -> Shape:
+    """R from Eq. 2.10, t = t0 R0 / R, T from Eq. 4.15: a thin wall that is stretched round alone."""
+    return _shape_of_the_braid(L, rest, "braid_of_thin_section")
+
+
 WALLS = {
     "inextensible_braid": wall_at_constant_volume,
     "braid_of_constant_thickness": wall_as_at_rest,
     "braid_of_thin_wall": wall_of_a_thin_bladder,
+    "braid_of_thin_section": wall_of_a_thin_section,
 }
 """The wall's thickness where the braid sets the radius."""
 
@@ -155,6 +166,7 @@ SHAPES = {
     "constant_thickness": shape_constant_thickness,
     "braid_of_constant_thickness": shape_braid_of_constant_thickness,
     "braid_of_thin_wall": shape_braid_of_thin_wall,
+    "braid_of_thin_section": shape_braid_of_thin_section,
 }
 """The two kinematics by their declared names, and two that an effect asks for."""
 

@@ -43,6 +43,30 @@ def test_a_kind_is_looked_for_beside_the_partner(tmp_path: Path) -> None:
     assert found.fits[PAIR, found.best_size(PAIR)].effects == {"order_too_low", "stress_softening:force"}
 
 
+def test_a_set_of_three_leaves_the_kinds_of_its_parts(tmp_path: Path) -> None:
+    """Softening of the whole force and a drift, each in a kind that its part took for want of the third."""
+    wanted = [("order_too_low", 40.0), ("stress_softening", 8.0), ("force_drift", 8.0)]
+    effects = tuple(Wanted(i, shared_form(i).name, multiple, 1) for i, multiple in wanted)
+    recipe = Recipe(
+        "three", 0, "separable", "tensile", "thumb", "tensile", 5, 3, 2, 1500,
+        kinematics="constant_thickness", friction="none", effects=effects,
+    )  # fmt: skip
+    rig_case.write_case(build_case(recipe), tmp_path / "specimen", tmp_path / "truth.json")
+    problem = problem_of(read(tmp_path / "specimen"))
+    three, tested = frozenset(i for i, _ in wanted), tuple(i for i, _ in wanted)
+    wrong = fit(
+        problem,
+        frozenset({"order_too_low:bent", "stress_softening:test-bent", "force_drift:settling-bent"}),
+        0,
+    )
+    found = Search(problem, tested, Alone(problem), fits={(three, 0): wrong})
+    found.bend_all([(three, 0), (PAIR, 0)])
+    assert set(found.fits) == {(three, 0)}
+    better = found.fits[three, 0]
+    assert "stress_softening:force-bent" in better.effects
+    assert better.log_evidence > wrong.log_evidence + 10.0
+
+
 def test_beside_two_others_a_cause_has_the_form_that_it_had_beside_one() -> None:
     """Alone, creep of the wall may make up for a bent law of pressure; beside the law it is what it is."""
     problem = problem_of(specimen_of("develop-null-001"))

@@ -46,6 +46,20 @@ def test_a_supply_that_is_shut_off_follows_boyle(droop: float) -> None:
     assert float(lost[0, 0]) == pytest.approx(droop, rel=1e-9)
 
 
+@pytest.mark.parametrize("steep", [0.5, 3.0, 20.0])
+def test_a_droop_that_saturates_relaxes_towards_its_end(steep: float) -> None:
+    """Its slope falls with what has been lost, dy/dx = k (y_∞ − y); none at the start, all at full stroke."""
+    setting = setting_for("pressure_droop:saturating")
+    x = np.linspace(0.0, setting.stroke, 2001)
+    at = start(setting, replace(rows(setting, len(x)), displacement=x))
+    values = {"droop_percent": one(0.08), "droop_steepness": one(steep)}
+    y = np.ravel(1.0 - effect("pressure_droop:saturating").apply(at, values, setting).pressure / at.pressure)
+    assert y[0] == pytest.approx(0.0, abs=1e-12) and y[-1] == pytest.approx(0.08)
+    left = 0.08 / -np.expm1(-steep) - y
+    slope = np.gradient(y, x / setting.stroke)
+    np.testing.assert_allclose(slope[1:-1], steep * left[1:-1], rtol=1e-3)
+
+
 @pytest.mark.parametrize("share", [0.02, 0.1, 0.3])
 def test_a_supply_with_play_follows_as_a_loose_gear_does(share: float) -> None:
     """The place is pushed along from either side of a gap, step by step; at rest it lay in the middle."""

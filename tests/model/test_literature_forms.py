@@ -341,14 +341,18 @@ def test_a_capstan_multiplies_the_force_by_an_exponential(s: float) -> None:
     np.testing.assert_allclose(found.fixed, np.exp(angle * s) * bare, rtol=1e-12)
 
 
-@pytest.mark.parametrize("form", ["thickness", "thin"])
-def test_a_wall_lies_within_the_strands_as_thick_as_ever_or_as_a_thin_one_s_volume_has_it(form: str) -> None:
+@pytest.mark.parametrize("form", ["thickness", "thin", "section"])
+def test_a_wall_lies_within_the_strands_as_thick_as_its_law_says(form: str) -> None:
     setting = setting_for(f"braid_kinematics:{form}")
     state = effect(f"braid_kinematics:{form}").apply(start(setting, rows(setting)), {}, setting)
     rest = state.rest
     shape = SHAPES[state.kinematics](rest.L0 * np.array([1.0, 0.9, 0.8]), rest)
     np.testing.assert_allclose(shape.t[:, :1], rest.t0)
-    kept = shape.t if form == "thickness" else shape.t * shape.R * shape.L
+    kept = {
+        "thickness": shape.t,
+        "thin": shape.t * shape.R * shape.L,
+        "section": shape.t * shape.R,
+    }[form]
     np.testing.assert_allclose(kept, kept[:, :1] + np.zeros((1, 3)))
     np.testing.assert_allclose(shape.R[:, :1], rest.R0)
     # The strands' length stays: L² + (2πN R)² with R0 tan α0 for L0 / (2πN).

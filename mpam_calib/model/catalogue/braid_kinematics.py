@@ -35,6 +35,11 @@ def _thin(state: State, values: Values, setting: Setting) -> State:
     return replace(state, kinematics="braid_of_thin_wall")
 
 
+def _section(state: State, values: Values, setting: Setting) -> State:
+    """The radius follows the strands and the wall thins as it is stretched round."""
+    return replace(state, kinematics="braid_of_thin_section")
+
+
 def _factor(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("braid_swell", Normal(1.0, 0.1), "the radius's growth over Eq. 2.10's", "", ""),)
 
@@ -50,12 +55,13 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"swell": _swell, "thickness": _thickness, "thin": _thin},
+        forms={"swell": _swell, "thickness": _thickness, "thin": _thin, "section": _section},
         own={"swell": _factor},
         sources={
             "swell": "Eq. 2.10 for strands a distance δ outside the wall: growth × (1 + δ/R0)",
             "thickness": "Eq. 2.10 with the declared t0 at any length (Chou & Hannaford 1996)",
             "thin": "Eq. 2.10 with t = t0 R0 L0/(R L), the volume of a thin wall",
+            "section": "Eq. 2.10 with t = t0 R0/R, a thin wall stretched round alone (plane strain)",
         },
         bends={"contraction": 2},
     )

@@ -72,9 +72,9 @@ register(
         own={"power": _exponent},
         sources={
             "power": "textbook: energy in strands whose stiffness grows with tension, ∝ P^m (linear: 2)",
-            "longer": "textbook: Hooke's law of a strand, whose length then sets angle and radius",
             "both": "the same with the energy of Eq. 2.25 (Davis, Tsagarakis, Canderle & Caldwell 2003)",
         },
+        kinds={"longer": "here the strands' length sets angle and radius, and no energy is lost"},
         bends={"contraction": 1, "pressure": 2},
         looseness=2.0,
     )

@@ -70,6 +70,17 @@ def _exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("droop_exponent", LogNormal(1.5, 0.5), "power of the stroke", "textbook", ""),)
 
 
+def _saturating(state: State, values: Values, setting: Setting) -> State:
+    """Most of it early in the stroke: an exponential approach, of which a whole stroke is the droop."""
+    steep = values["droop_steepness"]
+    place = np.maximum(state.displacement, 0.0) / setting.stroke
+    return _drooped(state, values, np.expm1(-steep * place) / np.expm1(-steep))
+
+
+def _steepness(setting: Setting) -> tuple[Parameter, ...]:
+    return (Parameter("droop_steepness", LogNormal(2.0, 0.7), "how early in the stroke", "", ""),)
+
+
 def _speed(state: State, values: Values, setting: Setting) -> State:
     """More of it the faster the stroke, by a power: 1 where the line's flow is laminar, 2 where it is not."""
     growth = power(over_mean(state.readings.pace, setting), values["flow_exponent"])
@@ -194,6 +205,7 @@ register(
             "level": _level,
             "power": _power,
             "level-power": _level_power,
+            "saturating": _saturating,
             "loss": _loss,
             "speed": _speed,
             "lagging": _lagging,
@@ -206,11 +218,12 @@ register(
         own=dict.fromkeys(("power", "level-power"), _exponent)
         | dict.fromkeys(("lagging", "volume"), _lag)
         | {"loss": _loss_exponent, "speed": _flow_exponent, "refill": _refill_time}
-        | {"play": _play_way, "throttle": _vented},
+        | {"saturating": _steepness, "play": _play_way, "throttle": _vented},
         recalls=("speed", "lagging", "play", "throttle", "volume", "refill"),
         sources={
             "power": "textbook: quadratic in the stroke; near 0.8 in proportion to the muscle's volume",
             "level-power": "the same over each level's own stroke",
+            "saturating": "textbook: exponential approach to a new balance, 1 − exp(−k·x), over the stroke",
             "loss": "textbook: a loss that is the same at every pressure, or goes with its root (orifice)",
             "speed": "line losses: Hagen-Poiseuille ∝ flow, turbulent or orifice ∝ flow²",
             "lagging": "textbook: first-order lag of a regulator or a line, τ·dy/dt + y = x",
