@@ -16,6 +16,8 @@ from mpam_calib.criticism.refits import Set
 
 Array = NDArray[np.float64]
 
+LIKELIEST, SINGLES = 5, 4
+"""Partners of a set that lines promise most of, and effects that are tried for being good alone."""
 LEVEL = 1e-6
 """Share of its power by which a line is damped: lines of one cause are often alike."""
 
@@ -37,6 +39,39 @@ def promising(
             found = fits[base, 0].log_evidence + gain(np.array(lines), residual)
             reached[base | {new}] = max(found, reached.get(base | {new}, -np.inf))
     return sorted(reached, key=lambda s: (-reached[s], sorted(s)))
+
+
+def partners(
+    problem: Problem,
+    fits: Mapping[tuple[Set, int], Fit],
+    tested: tuple[str, ...],
+    effects: Set,
+    size: int,
+    singles: list[str],
+) -> list[str]:
+    """Effects worth adding to a set: those of which lines promise most, and the best ``singles``.
+
+    By the residual that it leaves beside a remainder of this ``size`` and, where that is known, beside none.
+    """
+    new = [p for p in tested if p not in effects]
+
+    def promised(at: int) -> list[str]:
+        gains = {p: _alone(problem, fits, effects, p, at) for p in new}
+        return sorted(gains, key=lambda p: -gains[p])[:LIKELIEST]
+
+    bare = promised(0) if (effects, 0) in fits else promised(size)
+    return list(dict.fromkeys([*promised(size), *bare, *singles[:SINGLES]]))
+
+
+def _alone(
+    problem: Problem, fits: Mapping[tuple[Set, int], Fit], effects: Set, partner: str, size: int
+) -> float:
+    """Nats that one linear step along what a partner does alone would gain on a set (moduli free)."""
+    single, nothing = fits.get((frozenset([partner]), size)), fits.get((frozenset(), size))
+    if single is None or nothing is None:
+        return -np.inf
+    signature = problem.white(single.force - nothing.force, size)
+    return gain(signature[None], problem.white(problem.force - fits[effects, size].force, size))
 
 
 def gain(lines: Array, residual: Array) -> float:

@@ -32,7 +32,7 @@ from mpam_calib.criticism.refits import (
     with_doubt,
     with_doubted_equations,
 )
-from mpam_calib.criticism.screen import gain, promising
+from mpam_calib.criticism.screen import partners, promising
 from mpam_calib.criticism.spread import Alone, Spread
 from mpam_calib.model.bend import is_bend
 from mpam_calib.model.effect import effect
@@ -58,7 +58,7 @@ NEAR, POLISHED = 25.0, 40
 """Nats behind the best within which sets are tried in all their forms, and how many of these at most."""
 LEADERS = 5
 """Sets whose parts and forms are looked at once more."""
-DOUBTED, DOUBTED_EACH = 12, 4
+DOUBTED, DOUBTED_EACH = 24, 4
 """Leading sets, and best sets of every number of effects, whose forms are doubted in the end."""
 STARTS = (0.8, -0.8)
 """Further starts (prior sds) for a single effect: the force is curved in some of them."""
@@ -187,6 +187,24 @@ class Search:
         self.polished |= {k: f.effects == self.fits[k].effects for k, f in better.items()}
         self.fits.update(better)
 
+    def swap(self, effects: Set) -> None:
+        """Refit the sets in which another cause takes the place of one, the others in the forms they have.
+
+        Where a set was seen before, its causes may have had the forms of poorer company.
+        """
+        found = self.fits[effects, self.best_size(effects)]
+        keys, tasks = [], []
+        for left in sorted(effects):
+            kept = {e: form for e, form in named_forms(found).items() if e != left}
+            for new in (e for e in self.tested if e not in effects):
+                tries = [(tuple((kept | {new: form}).values()), ended(found)) for form in flexible(new)]
+                keys.append((frozenset([*kept, new]), 0))
+                tasks.append((0, tries, self.doubting))
+        for key, fit in zip(keys, self.spread(best_of, tasks, chunk=4), strict=True):
+            if fit is not None and (key not in self.fits or fit.log_evidence > self.fits[key].log_evidence):
+                self.fits[key] = fit
+                self.polished.pop(key, None)
+
     def bend_all(self, keys: Iterable[tuple[Set, int]]) -> None:
         """Change one bent form of a set at a time: its parts had theirs to make up for what they lacked."""
         todo = [k for k in keys if k in self.fits]
@@ -314,7 +332,12 @@ def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
             # Small causes show only beside each other: all pairs are worth a look.
             found.refit_all((frozenset(pair), 0) for pair in combinations(tested, 2))
         tell(0.2 if k == 2 else 0.6)
-        tries = {s | {p} for s in kept for p in _partners(found, s, best) if p not in s}
+        tries = {
+            s | {p}
+            for s in kept
+            for p in partners(found.problem, found.fits, tested, s, found.best_size(s), best)
+            if p not in s
+        }
         # A straight line along what a cause does alone may miss what it does beside others.
         tries |= {s | {p} for s in kept[: width // LEADING_SHARE] for p in tested if p not in s}
         for size in (0, 1):
@@ -340,8 +363,8 @@ def _finish(found: Search, tell: Callable[[float], None]) -> None:
     for turn in range(2):
         tell(0.85 + 0.07 * turn)
         # One cause of the best set may stand in for another that no kept set led to.
-        first = found.sets[0]
-        found.refit_all((first - {e} | {p}, 0) for e in sorted(first) for p in found.tested if p not in first)
+        found.swap(found.sets[0])
+        found.polish_near()
         # A leader's own parts must have been looked at, or it could hide a passenger.
         leaders = found.sets[:LEADERS]
         parts = [frozenset(p) for s in leaders for p in combinations(sorted(s), max(len(s) - 1, 0))]
@@ -378,23 +401,3 @@ def _keep(found: Search, count: int, width: int) -> list[Set]:
 def _by(sets: set[Set], figure: Callable[[Set], float]) -> list[Set]:
     """The sets with the largest figure first, in the same order in every process where figures tie."""
     return sorted(sets, key=lambda s: (-figure(s), sorted(s)))
-
-
-def _partners(found: Search, effects: Set, singles: list[str]) -> list[str]:
-    """Effects worth adding to a set: the best linearised gains on its residual, and the best singles."""
-    size = found.best_size(effects)
-    gains = {p: _gain(found, effects, p, size) for p in found.tested if p not in effects}
-    bare = {p: _gain(found, effects, p, 0) for p in gains} if (effects, 0) in found.fits else gains
-    best = sorted(gains, key=lambda p: -gains[p])[:5] + sorted(bare, key=lambda p: -bare[p])[:5]
-    return list(dict.fromkeys([*best, *singles[:4]]))
-
-
-def _gain(found: Search, effects: Set, partner: str, size: int) -> float:
-    """Nats that one linear step along a partner's signature would gain (moduli free)."""
-    single, base = found.fits.get((frozenset([partner]), size)), found.fits[effects, size]
-    nothing = found.fits.get((frozenset(), size))
-    if single is None or nothing is None:
-        return -np.inf
-    signature = found.problem.white(single.force - nothing.force, size)
-    residual = found.problem.white(found.problem.force - base.force, size)
-    return gain(signature[None], residual)

@@ -128,6 +128,24 @@ def test_a_wall_s_share_may_go_with_the_pressure() -> None:
     np.testing.assert_allclose(missing, missing[..., :1] * ratio**0.7, rtol=1e-12)
 
 
+@pytest.mark.parametrize("tension", [5e3, 4e4])
+def test_strands_under_the_sleeve_s_tension_rub_as_under_more_pressure(tension: float) -> None:
+    """Friction ∝ (P + P0)^(4/3) at one place, whatever the level; without tension it is Eq. 2.43."""
+    setting = setting_for("strand_friction:tension")
+    levels = np.array([2e4, 8e4, 1.5e5, 3e5])
+    at = replace(rows(setting, 4), pressure=levels, displacement=np.full(4, 0.004), sign=np.ones(4))
+    bare = force(without(setting), {}, at)
+
+    def rubbing(form: str, **values: float) -> np.ndarray:
+        known = {"f_s": one(0.3), **{k: one(v) for k, v in values.items()}}
+        return np.ravel(force(setting_for(form), known, at) - bare)
+
+    found = rubbing("strand_friction:tension", sleeve_tension_kPa=tension)
+    np.testing.assert_allclose(found / found[0], ((levels + tension) / (levels[0] + tension)) ** (4.0 / 3.0))
+    none = rubbing("strand_friction:tension", sleeve_tension_kPa=1e-9)
+    np.testing.assert_allclose(none, rubbing("strand_friction"), rtol=1e-9)
+
+
 def test_strands_that_stretch_grow_longer_and_store_energy() -> None:
     """What the shape loses and what the force loses, both from one factor."""
     form = "braid_stretch:both"

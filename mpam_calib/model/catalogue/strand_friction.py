@@ -78,6 +78,19 @@ def _contact_exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("contact_exponent", Normal(0.0, 1.0), "power of the contact's spread", "", ""),)
 
 
+def _tension(state: State, values: Values, setting: Setting) -> State:
+    """A sleeve whose own tension presses the strands together, as so much more pressure would."""
+    middle, own = middle_pressure(setting), values["sleeve_tension_kPa"]
+    pressed = power((state.pressure + own) / (middle + own), np.full((1, 1), HERTZIAN))
+    part = pressed * power(state.pressure / middle, np.full((1, 1), -HERTZIAN))
+    return _rubbing(state, values, part)
+
+
+def _own_tension(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LogNormal(0.3 * middle_pressure(setting), 0.7)
+    return (Parameter("sleeve_tension_kPa", prior, "pressure that the sleeve's own tension is like", ""),)
+
+
 register(
     Effect(
         id="strand_friction",
@@ -93,12 +106,13 @@ register(
         apply=_apply,
         memory=False,
         needs_braid=True,
-        forms={"power": _power, "even": _even, "contact": _contact},
-        own={"power": _exponent, "even": _exponent, "contact": _contact_exponent},
+        forms={"power": _power, "even": _even, "contact": _contact, "tension": _tension},
+        own={"power": _exponent, "even": _exponent, "contact": _contact_exponent, "tension": _own_tension},
         sources={
             "power": "Amontons ∝ P; Hertzian contacts ∝ P^(2/3) (Archard 1957); Eq. 2.43 ∝ P^(4/3)",
             "even": "adhesion ∝ contact area ∝ P^m, m = 2/3 to 1 (Bowden & Tabor 1950; Archard 1957)",
             "contact": "friction ∝ pressure × contact area along the stroke (Davis & Caldwell 2006)",
+            "tension": "Eq. 2.43 of P + P_0, for a sleeve that presses at no pressure too (textbook)",
         },
         bends={"pressure": 1, "contraction": 2},
     )
