@@ -66,7 +66,7 @@ def gather_points(specimen: Specimen) -> Points | None:
         sign = np.where(np.abs(grid.branch) == 1, grid.branch, 0).astype(np.float64)
         rows = Readings.at_rest(grid.pressure_Pa, grid.contraction * L0, sign)
         rows = Readings(**{**rows.__dict__, "level": grid.level})
-        curve = np.unique(np.stack([grid.level, grid.branch]), axis=1, return_inverse=True)[1]
+        curve = np.unique(np.stack([grid.level, grid.branch]), axis=1, return_inverse=True)[1].ravel()
         lifted = lifted_by_noise(grid.force_N, grid.contraction, curve, grid.censored, floor)
         add(rows, grid.force_N, grid.censored | lifted, 0)
     if (blocked := specimen.blocked_force) is not None:
