@@ -16,6 +16,7 @@ from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.climb import Climb, Place
 from mpam_calib.criticism.fit import chain_for, doubt_on_rows, fit
 from mpam_calib.criticism.forms import flexible, forms_of, price
+from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.refits import best_of, with_better_forms, with_doubt, with_doubted_equations
 from mpam_calib.criticism.search import NEAR, POLISHED, Search, search
 from mpam_calib.criticism.spread import Alone, spread_over
@@ -25,20 +26,25 @@ from mpam_calib.specimen import read
 PAIR = frozenset({"order_too_low", "stress_softening"})
 
 
+def hiding(wanted: list[tuple[str, float]], folder: Path) -> Problem:
+    """A test that hides these causes, each so many noise sds large (rms)."""
+    effects = tuple(Wanted(i, shared_form(i).name, multiple, 1) for i, multiple in wanted)
+    recipe = Recipe(
+        "kinds", 0, "separable", "tensile", "thumb", "tensile", 5, 3, 2, 1500,
+        kinematics="constant_thickness", friction="none", effects=effects,
+    )  # fmt: skip
+    rig_case.write_case(build_case(recipe), folder / "specimen", folder / "truth.json")
+    return problem_of(read(folder / "specimen"))
+
+
 def test_a_kind_is_looked_for_beside_the_partner(tmp_path: Path) -> None:
     """A wall whose next order is missing, and softening of the whole force (not the wall's stress alone).
 
     Alone, softening takes what the missing order leaves for a change of the wall's stress; with the partner
     in its place only the true kind needs no bend.
     """
-    wanted = [("order_too_low", 40.0), ("stress_softening", 8.0)]
-    effects = tuple(Wanted(i, shared_form(i).name, multiple, 1) for i, multiple in wanted)
-    recipe = Recipe(
-        "kinds", 0, "separable", "tensile", "thumb", "tensile", 5, 3, 2, 1500,
-        kinematics="constant_thickness", friction="none", effects=effects,
-    )  # fmt: skip
-    rig_case.write_case(build_case(recipe), tmp_path / "specimen", tmp_path / "truth.json")
-    found = search(problem_of(read(tmp_path / "specimen")), (*sorted(PAIR), "length_offset", "wall_pressure"))
+    problem = hiding([("order_too_low", 40.0), ("stress_softening", 8.0)], tmp_path)
+    found = search(problem, (*sorted(PAIR), "length_offset", "wall_pressure"))
     assert found.sets[0] == PAIR
     assert found.fits[PAIR, found.best_size(PAIR)].effects == {"order_too_low", "stress_softening:force"}
 
@@ -46,13 +52,7 @@ def test_a_kind_is_looked_for_beside_the_partner(tmp_path: Path) -> None:
 def test_a_set_of_three_leaves_the_kinds_of_its_parts(tmp_path: Path) -> None:
     """Softening of the whole force and a drift, each in a kind that its part took for want of the third."""
     wanted = [("order_too_low", 40.0), ("stress_softening", 8.0), ("force_drift", 8.0)]
-    effects = tuple(Wanted(i, shared_form(i).name, multiple, 1) for i, multiple in wanted)
-    recipe = Recipe(
-        "three", 0, "separable", "tensile", "thumb", "tensile", 5, 3, 2, 1500,
-        kinematics="constant_thickness", friction="none", effects=effects,
-    )  # fmt: skip
-    rig_case.write_case(build_case(recipe), tmp_path / "specimen", tmp_path / "truth.json")
-    problem = problem_of(read(tmp_path / "specimen"))
+    problem = hiding(wanted, tmp_path)
     three, tested = frozenset(i for i, _ in wanted), tuple(i for i, _ in wanted)
     wrong = fit(
         problem,
