@@ -60,7 +60,7 @@ def partners(
         return sorted(gains, key=lambda p: -gains[p])[:LIKELIEST]
 
     bare = promised(0) if (effects, 0) in fits else promised(size)
-    return list(dict.fromkeys([*promised(size), *bare, *singles[:SINGLES]]))
+    return list(dict.fromkeys([*promised(size), *bare, *(s for s in singles[:SINGLES] if s in new)]))
 
 
 def _alone(

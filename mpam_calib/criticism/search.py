@@ -188,19 +188,15 @@ class Search:
         self.fits.update(better)
 
     def swap(self, effects: Set) -> None:
-        """Refit the sets in which another cause takes the place of one, the others in the forms they have.
-
-        Where a set was seen before, its causes may have had the forms of poorer company.
-        """
+        """Refit sets with another cause in the place of one; the others had the forms of poorer company."""
         found = self.fits[effects, self.best_size(effects)]
-        keys, tasks = [], []
+        tasks: dict[tuple[Set, int], tuple[int, list[Try], bool]] = {}
         for left in sorted(effects):
             kept = {e: form for e, form in named_forms(found).items() if e != left}
             for new in (e for e in self.tested if e not in effects):
                 tries = [(tuple((kept | {new: form}).values()), ended(found)) for form in flexible(new)]
-                keys.append((frozenset([*kept, new]), 0))
-                tasks.append((0, tries, self.doubting))
-        for key, fit in zip(keys, self.spread(best_of, tasks, chunk=4), strict=True):
+                tasks[frozenset([*kept, new]), 0] = (0, tries, self.doubting)
+        for key, fit in zip(tasks, self.spread(best_of, tasks.values(), chunk=4), strict=True):
             if fit is not None and (key not in self.fits or fit.log_evidence > self.fits[key].log_evidence):
                 self.fits[key] = fit
                 self.polished.pop(key, None)
@@ -336,7 +332,6 @@ def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
             s | {p}
             for s in kept
             for p in partners(found.problem, found.fits, tested, s, found.best_size(s), best)
-            if p not in s
         }
         # A straight line along what a cause does alone may miss what it does beside others.
         tries |= {s | {p} for s in kept[: width // LEADING_SHARE] for p in tested if p not in s}

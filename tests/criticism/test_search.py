@@ -67,6 +67,33 @@ def test_a_set_of_three_leaves_the_kinds_of_its_parts(tmp_path: Path) -> None:
     assert better.log_evidence > wrong.log_evidence + 10.0
 
 
+def test_a_leader_s_causes_keep_their_forms_beside_another(tmp_path: Path) -> None:
+    """The true set was seen in a poor form; a leader with a stand-in for the drift has the good one."""
+    problem = hiding([("order_too_low", 40.0), ("stress_softening", 8.0), ("force_drift", 8.0)], tmp_path)
+    tested = ("order_too_low", "stress_softening", "force_drift", "creep", "length_offset")
+    true = frozenset(tested[:3])
+    leading = frozenset({"order_too_low:bent", "stress_softening:force-bent", "creep:bent"})
+    poor = fit(
+        problem, frozenset({"order_too_low:bent", "stress_softening:test-bent", "force_drift:bent"}), 0
+    )
+    leader = PAIR | {"creep"}
+    fits = {(leader, 0): fit(problem, leading, 0), (true, 0): poor}
+    found = Search(problem, tested, Alone(problem), fits=fits, polished={(true, 0): True})
+    found.swap(leader)
+    assert {s for s, _ in found.fits} == {leader} | {
+        leader - {e} | {p} for e in leader for p in ("force_drift", "length_offset")
+    }
+    better = found.fits[true, 0]
+    assert "stress_softening:force-bent" in better.effects
+    assert better.log_evidence > poor.log_evidence + 10.0
+    assert (true, 0) not in found.polished
+    # What is better than the swap stays.
+    best = replace(better, log_evidence=better.log_evidence + 1.0)
+    found.fits[true, 0] = best
+    found.swap(leader)
+    assert found.fits[true, 0] is best
+
+
 def test_beside_two_others_a_cause_has_the_form_that_it_had_beside_one() -> None:
     """Alone, creep of the wall may make up for a bent law of pressure; beside the law it is what it is."""
     problem = problem_of(specimen_of("develop-null-001"))
