@@ -58,8 +58,8 @@ NEAR, POLISHED = 25.0, 40
 """Nats behind the best within which sets are tried in all their forms, and how many of these at most."""
 LEADERS = 5
 """Sets whose parts and forms are looked at once more."""
-DOUBTED, DOUBTED_EACH = 24, 4
-"""Leading sets, and best sets of every number of effects, whose forms are doubted in the end."""
+DOUBTED, DOUBTED_EACH = 4, 4
+"""Leading sets for each that is extended, and best sets of every number of effects, doubted in the end."""
 STARTS = (0.8, -0.8)
 """Further starts (prior sds) for a single effect: the force is curved in some of them."""
 
@@ -211,11 +211,11 @@ class Search:
         near = [s for s in self.sets[:POLISHED] if self.score(s) > self.score(self.sets[0]) - NEAR]
         self.polish_all((s, self.best_size(s)) for s in near)
 
-    def doubt(self) -> None:
-        """Refit the leading sets, and the best of each number of effects, with a doubt about their forms."""
+    def doubt(self, leading: int) -> None:
+        """Refit so many leading sets, and the best of each number of effects, with a doubt of their forms."""
         sets, count = self.sets, range(LARGEST + 1)
         chosen = {
-            *sets[:DOUBTED],
+            *sets[:leading],
             *(s for k in count for s in [q for q in sets if len(q) == k][:DOUBTED_EACH]),
         }
         chosen |= {frozenset(p) for s in sets[:LEADERS] for p in combinations(sorted(s), max(len(s) - 1, 0))}
@@ -297,7 +297,7 @@ def search(
         found = Search(problem, tested, spread)
         _grow(found, width, tell)
         if not settle:
-            _finish(found, tell)
+            _finish(found, width, tell)
     if settle:
         best = found.sets[0]
         fits = [f for (effects, _), f in found.fits.items() if effects == best]
@@ -308,7 +308,7 @@ def search(
             before, found = found, found.on(settled, spread)
             if scale > MUCH_LESS:
                 found.polished = {k: True for k, stayed in before.polished.items() if stayed}
-            _finish(found, tell)
+            _finish(found, width, tell)
     found.spread = Alone(found.problem)
     return found
 
@@ -352,7 +352,7 @@ def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
     found.polish_near()
 
 
-def _finish(found: Search, tell: Callable[[float], None]) -> None:
+def _finish(found: Search, width: int, tell: Callable[[float], None]) -> None:
     """The leaders' neighbours and parts, and a doubt about the forms of all that lead."""
     found.polish_near()
     for turn in range(2):
@@ -370,7 +370,7 @@ def _finish(found: Search, tell: Callable[[float], None]) -> None:
     found.refit_all(
         (further, size) for further in found.with_one_more(first) for size in {0, found.best_size(first)}
     )
-    found.doubt()
+    found.doubt(DOUBTED * width)
 
 
 def _polish(found: Search, sets: Iterable[Set]) -> None:

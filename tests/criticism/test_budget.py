@@ -30,7 +30,7 @@ def found() -> Search:
 def doubted(search: Search) -> Search:
     """The same, in the state after the doubt."""
     fresh = replace(search, fits=dict(search.fits))
-    fresh.doubt()
+    fresh.doubt(leading=24)
     return fresh
 
 
