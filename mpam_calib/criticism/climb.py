@@ -103,9 +103,33 @@ class Climb:
         return tuple(p.name for p in self.chain.parameters)
 
     @cached_property
+    def _by_level(self) -> int:
+        """How many sizes, the first ones, move the force at one level each."""
+        return self.chain.friction.by_level if np.all(self.problem.lean[0].level >= 0) else 0
+
+    @cached_property
+    def _moves(self) -> NDArray[np.intp]:
+        """The move (d,) that each size takes part in: those at one level each share the first.
+
+        No reading feels more than one of them (Curtis, Powell and Reid 1974).
+        """
+        return np.maximum(np.arange(len(self.names)) - max(self._by_level - 1, 0), 0)
+
+    @cached_property
     def _offsets(self) -> Array:
+        """Where the force is looked at: at the place itself and after each move, (1 + moves, d)."""
         d = len(self.names)
-        return np.concatenate([np.zeros((1, d)), STEP * np.eye(d)])
+        offsets = np.zeros((1 + int(self._moves.max(initial=-1)) + 1, d))
+        offsets[1 + self._moves, np.arange(d)] = STEP
+        return offsets
+
+    def _moved(self, force: Array) -> Array:
+        """What a STEP of each size makes of the force (1 + moves, n) at the offsets, (n, d)."""
+        moved = (force[1:] - force[0])[self._moves].T
+        _, first, _ = self.problem.lean
+        level = self.problem.lean[0].level[first]
+        moved[:, : self._by_level] *= level[:, None] == np.arange(self._by_level)
+        return np.asarray(moved)
 
     @cached_property
     def _extra(self) -> Array:
@@ -151,7 +175,7 @@ class Climb:
         force = fixed + slope * (columns @ best[:p])
         if self.chain.uses_force:
             force = guide + (force - guide) * factor
-        force = np.broadcast_to(force, (len(points), len(readings)))[: len(u) + 1]
+        force = np.broadcast_to(force, (len(points), len(readings)))[: len(self._offsets)]
         whole = rows(force) + problem.bow
         objective = -0.5 * float(residual @ residual + u @ u + best @ best)
         return Place(
@@ -159,7 +183,7 @@ class Climb:
             eta=best,
             residual=residual,
             columns=X,
-            moved=(whole[1:] - whole[0]).T,
+            moved=self._moved(whole),
             force=whole[0],
             guide=force[0],
             taken=np.sign(guide - beside[0]),

@@ -125,6 +125,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "bursts_N": _round(verdict.faults.bursts),
         "hum_N": _round(verdict.faults.hum),
         "step_N": _round(verdict.faults.step),
+        "chatter_N": _round(verdict.faults.chatter),
         "load_cell_nats": None if verdict.load_cell is None else _round(verdict.load_cell),
         "load_cell_fault": verdict.cell_fault,
         "searched": {

@@ -7,6 +7,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from mpam_calib.criticism.bursts import bursts_rms
+from mpam_calib.criticism.chatter import chatter_rms
 from mpam_calib.criticism.converter import coarse_step
 from mpam_calib.criticism.fit import Fit
 from mpam_calib.criticism.hum import hum_rms
@@ -25,7 +26,8 @@ class Faults:
 
     ``saturated`` is the share of the readings at the end of the load cell's range, ``repeating`` (N) fine
     structure that the strokes share, ``bursts`` (N) readings that stand out of their strokes, ``hum`` (N) one
-    frequency in all readings, ``step`` (N) that of a converter coarser than the noise.
+    frequency in all readings, ``step`` (N) that of a converter coarser than the noise, ``chatter`` (N) what
+    the readings scatter more one way than the other.
     """
 
     saturated: float = 0.0
@@ -33,6 +35,7 @@ class Faults:
     bursts: float = 0.0
     hum: float = 0.0
     step: float = 0.0
+    chatter: float = 0.0
 
     def __bool__(self) -> bool:
         return any(astuple(self))
@@ -56,4 +59,5 @@ def faults_of(problem: Problem, fitted: Fit) -> Faults:
         bursts=0.0 if problem.blueprint.noise.robust else bursts_rms(rows, residual, grows),
         hum=max(hum_rms(rows, residual), wave_rms(rows, residual)),
         step=coarse_step(rows.force, noise.total),
+        chatter=chatter_rms(rows, residual, grows),
     )

@@ -35,6 +35,12 @@ class DeclaredFriction:
             return [stem]
         return [f"{stem}@{label}" for label in level_labels(self.setting.levels)]
 
+    @property
+    def by_level(self) -> int:
+        """How many of the factors act at one level each: all, where there is more than one."""
+        names = self.names
+        return len(names) if len(names) > 1 else 0
+
     def parameters(self) -> tuple[Parameter, ...]:
         """The factors' priors."""
         make = k_f if self.setting.simulation.friction == "coulomb" else f_s
@@ -48,17 +54,17 @@ class DeclaredFriction:
         if len(names) == 1:
             factor = values[names[0]]
         else:
-            factor = (
-                np.concatenate([values[name] for name in names], axis=1) @ self._weights(state.readings).T
-            )
+            factor = self._at(state.readings, np.concatenate([values[name] for name in names], axis=1))
         if self.setting.simulation.friction == "coulomb":
             return replace(state, coulomb=state.coulomb + factor)
         return replace(state, strand=state.strand + factor)
 
-    def _weights(self, readings: Readings) -> Array:
-        """Share of each level's factor in each row, (n, levels): its own level, else interpolated."""
+    def _at(self, readings: Readings, factors: Array) -> Array:
+        """The factors (B, levels) at the readings, (B, n): that of the own level, else interpolated."""
+        known = readings.level >= 0
+        if known.all():
+            return np.asarray(factors[:, readings.level])
         eye = np.eye(len(self.setting.levels))
         weights = np.stack([np.interp(readings.pressure, self.setting.levels, row) for row in eye], axis=-1)
-        known = readings.level >= 0
         weights[known] = eye[readings.level[known]]
-        return weights
+        return np.asarray(factors @ weights.T)

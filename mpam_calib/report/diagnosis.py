@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from mpam_calib.criticism.diagnose import Diagnosis
-from mpam_calib.criticism.load_cell import FAULT, RESCALED, ZEROED
 from mpam_calib.criticism.verdict import BESIDE
 from mpam_calib.model.bend import FORM, is_bend
 from mpam_calib.model.effect import effect
@@ -29,6 +28,7 @@ from mpam_calib.report.page import (
     Text,
     Verdict,
 )
+from mpam_calib.report.unremoved import unremoved
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import KPA
 
@@ -107,7 +107,7 @@ def _reasons(content: dict[str, Any]) -> list[str]:
         for c in content["causes"]
     ]
     if content["verdict"] == "unexplained":
-        reasons += _left(content)
+        reasons += unremoved(content)
     reasons += [
         f"{effect(c['id']).title} stays inside twice its declared uncertainty"
         for c in content["causes"]
@@ -147,54 +147,6 @@ def _against(gain: dict[str, Any], which: str, elpd: str, such: str) -> str:
     if gain[f"coverage90_{which}"] < COVERED:
         against.append(f"{100.0 * gain[f'coverage90_{which}']:.0f} % of them lie in the 90 % bands")
     return "; ".join(against)
-
-
-CELL_FAULTS = {
-    FAULT: ("that shows less and less of large forces", "load it with dead weights up to the blocked force"),
-    ZEROED: (
-        "whose zero differs from level to level",
-        "look at it with the muscle unhooked, before and after each level",
-    ),
-    RESCALED: (
-        "whose gain differs from level to level",
-        "hang one dead weight on it before and after each level, and look at its plug and its range",
-    ),
-}
-"""What a load cell does that explains the readings, and how to look at it."""
-
-
-def _left(content: dict[str, Any]) -> list[str]:
-    """What no set of causes removes."""
-    found = []
-    if content["saturated_share"] > 0.0:
-        share = significant(100.0 * content["saturated_share"])
-        found.append(f"the load cell saturates: {share} % of the readings lie at one extreme force")
-    if content["repeating_N"] > 0.0:
-        size = significant(content["repeating_N"])
-        found.append(f"a fine structure of {size} N comes back in every stroke at the same place")
-    if content["bursts_N"] > 0.0:
-        size = significant(content["bursts_N"])
-        found.append(
-            f"bursts of {size} N (over all readings) stand out of their strokes: a loose plug? What cannot "
-            "be recorded again is calibrated with [noise] robust = true"
-        )
-    if content["hum_N"] > 0.0:
-        size = significant(content["hum_N"])
-        found.append(
-            f"a hum of {size} N, one frequency in all strokes: mains, a pump, a loose shield, "
-            "a regulator that hunts?"
-        )
-    if content["step_N"] > 0.0:
-        size = significant(content["step_N"])
-        found.append(f"forces are recorded in steps of {size} N, coarser than their noise: use a finer range")
-    if content["load_cell_nats"] is not None:
-        by = "better" if content["load_cell_nats"] > 0.0 else "nearly as well"
-        cell, look = CELL_FAULTS[content["load_cell_fault"]]
-        found.append(f"a load cell {cell} explains the readings {by}: {look}")
-    elif content["remainder_N"] > 0.0 or not found:
-        size = significant(content["remainder_N"])
-        found.append(f"structure of {size} N is left beside every set tried")
-    return found
 
 
 def _structure(content: dict[str, Any]) -> list[Block]:

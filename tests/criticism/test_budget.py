@@ -71,7 +71,7 @@ def test_rows_at_rest_hide_no_misfit_of_the_others() -> None:
 def test_a_crosshead_that_rests_leaves_the_budget_as_it_is(found: Search) -> None:
     moving = misfit_budget(found, CAUSES)
     problem = found.problem
-    rest = np.arange(len(problem)) % 12 == 0
+    rest = np.arange(len(problem)) % 11 == 0  # Every place in a stroke in turn.
     doubt = np.where(rest, 20.0 * problem.noise_level.total, 0.0)
     resting = replace(found, problem=replace(problem, noise=problem.noise + np.diag(doubt**2)))
     budget = misfit_budget(resting, CAUSES)

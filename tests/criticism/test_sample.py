@@ -14,7 +14,8 @@ from rig import sets
 from criticism.score import Scored, score_case
 from mpam_calib.posterior.pool import settle_worker
 
-STRIDES = {"null": 12, "separable": 9, "outside": 7}
+STRIDES = {"null": 24, "separable": 14, "outside": 7}
+"""One case without a cause, those of one, two and three causes, two from outside the catalogue."""
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +38,8 @@ def test_hidden_causes_lead_and_wrong_names_are_rare(scored: dict[str, list[Scor
     cases = scored["separable"]
     first = sum(case.listed[:1] == (case.truth,) for case in cases)
     wrong = sum(case.word == "named" and case.named != case.truth for case in cases)
-    assert first >= 3, [(case.name, case.word, sorted(case.named)) for case in cases]
-    assert wrong <= 1
+    assert first >= 2, [(case.name, case.word, sorted(case.named)) for case in cases]
+    assert wrong == 0
 
 
 def test_what_is_outside_the_catalogue_gets_no_name(scored: dict[str, list[Scored]]) -> None:

@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 from criticism.test_hypotheses import problem_of, specimen_of
 
-from mpam_calib.criticism.load_cell import FAULT
 from mpam_calib.model.effect import effect
-from mpam_calib.report.diagnosis import BENT, CELL_FAULTS, _causes, _left, _unproven
+from mpam_calib.report.diagnosis import BENT, _causes, _unproven
 from mpam_calib.report.page import DataTable, Text
 
 HOLDS = {
@@ -55,40 +54,6 @@ def test_left_out_readings_against_what_a_fold_chose_by_itself(changed: dict[str
 
 def test_left_out_readings_that_say_nothing_against_them() -> None:
     assert _unproven({"gain": HOLDS}) == _unproven({"gain": None}) == []
-
-
-FAULTLESS = {
-    **dict.fromkeys(("saturated_share", "repeating_N", "bursts_N", "hum_N", "step_N", "remainder_N"), 0.0),
-    "load_cell_nats": None,
-    "load_cell_fault": "load_cell",
-}
-
-
-@pytest.mark.parametrize(
-    ("fault", "said"),
-    [
-        ("load_cell", "dead weights up to the blocked force"),
-        ("load_cell:zeroed", "with the muscle unhooked"),
-        ("load_cell:rescaled", "its plug and its range"),
-    ],
-)
-@pytest.mark.parametrize(("nats", "by"), [(12.0, "better"), (-2.0, "nearly as well")])
-def test_a_load_cell_at_fault_is_told_with_how_to_look_at_it(
-    fault: str, said: str, nats: float, by: str
-) -> None:
-    (text,) = _left(FAULTLESS | {"load_cell_nats": nats, "load_cell_fault": fault})
-    assert said in text
-    assert f"explains the readings {by}" in text
-
-
-def test_every_fault_of_the_load_cell_has_words() -> None:
-    assert set(CELL_FAULTS) == {FAULT, *(f"{FAULT}:{form}" for form in effect(FAULT).forms)}
-
-
-def test_a_hum_is_told_with_what_may_cause_it() -> None:
-    (text,) = _left(FAULTLESS | {"hum_N": 1.234})
-    assert "1.23 N" in text
-    assert "a regulator that hunts" in text
 
 
 @pytest.mark.parametrize("form", ["", "bent"])

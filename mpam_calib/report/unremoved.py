@@ -1,0 +1,61 @@
+"""What no set of causes removes, in the words of the diagnosis page, and where to look for it on the rig."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mpam_calib.criticism.load_cell import FAULT, RESCALED, ZEROED
+from mpam_calib.report.numbers import significant
+
+CELL_FAULTS = {
+    FAULT: ("that shows less and less of large forces", "load it with dead weights up to the blocked force"),
+    ZEROED: (
+        "whose zero differs from level to level",
+        "look at it with the muscle unhooked, before and after each level",
+    ),
+    RESCALED: (
+        "whose gain differs from level to level",
+        "hang one dead weight on it before and after each level, and look at its plug and its range",
+    ),
+}
+"""What a load cell does that explains the readings, and how to look at it."""
+
+
+def unremoved(content: dict[str, Any]) -> list[str]:
+    """What no set of causes removes."""
+    found = []
+    if content["saturated_share"] > 0.0:
+        share = significant(100.0 * content["saturated_share"])
+        found.append(f"the load cell saturates: {share} % of the readings lie at one extreme force")
+    if content["repeating_N"] > 0.0:
+        size = significant(content["repeating_N"])
+        found.append(f"a fine structure of {size} N comes back in every stroke at the same place")
+    if content["bursts_N"] > 0.0:
+        size = significant(content["bursts_N"])
+        found.append(
+            f"bursts of {size} N (over all readings) stand out of their strokes: a loose plug? What cannot "
+            "be recorded again is calibrated with [noise] robust = true"
+        )
+    if content["hum_N"] > 0.0:
+        size = significant(content["hum_N"])
+        found.append(
+            f"a hum of {size} N, one frequency in all strokes: mains, a pump, a loose shield, "
+            "a regulator that hunts?"
+        )
+    if content["chatter_N"] > 0.0:
+        size = significant(content["chatter_N"])
+        found.append(
+            f"the readings scatter by {size} N more one way than on the way back: strands that stick and "
+            "slip, a guide that chatters? See whether another speed ends it"
+        )
+    if content["step_N"] > 0.0:
+        size = significant(content["step_N"])
+        found.append(f"forces are recorded in steps of {size} N, coarser than their noise: use a finer range")
+    if content["load_cell_nats"] is not None:
+        by = "better" if content["load_cell_nats"] > 0.0 else "nearly as well"
+        cell, look = CELL_FAULTS[content["load_cell_fault"]]
+        found.append(f"a load cell {cell} explains the readings {by}: {look}")
+    elif content["remainder_N"] > 0.0 or not found:
+        size = significant(content["remainder_N"])
+        found.append(f"structure of {size} N is left beside every set tried")
+    return found

@@ -1,0 +1,50 @@
+"""The climb's slopes: sizes that act at one level each are moved together, and come out as if one by one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpam_calib.criticism.candidates import candidates
+from mpam_calib.criticism.climb import Climb
+from mpam_calib.criticism.fit import chain_for
+from mpam_calib.criticism.forms import forms_of
+from mpam_calib.criticism.problem import Problem
+
+from .test_hypotheses import problem_of, specimen_of
+
+
+@pytest.fixture(scope="module", params=["coulomb", "strand"])
+def problem(request: pytest.FixtureRequest) -> Problem:
+    """Friction of its own at every level."""
+    specimen = specimen_of("develop-separable-028")
+    declared = specimen.simulation.model_copy(update={"friction": request.param, "friction_by_pressure": True})
+    return problem_of(replace(specimen, simulation=declared))
+
+
+def climb_of(problem: Problem, form: str) -> Climb:
+    chain = chain_for(problem.blueprint.model_dump_json(), frozenset([form]))
+    return Climb(problem, chain, 0, np.empty((len(problem), 0)))
+
+
+def test_sizes_of_one_level_each_are_moved_together_as_if_one_by_one(problem: Problem) -> None:
+    levels = len(np.unique(problem.level))
+    for form in (form for tested in candidates(problem).tested for form in forms_of(tested)):
+        together, apart = climb_of(problem, form), climb_of(problem, form)
+        apart.__dict__["_by_level"] = 0
+        u = 0.3 * np.random.default_rng(2).standard_normal(len(together.names))
+        found, expected = (
+            climb.look(u, climb.guide(), np.full(climb.chain.linear_size, 0.1)) for climb in (together, apart)
+        )
+        assert len(together._offsets) == len(apart._offsets) - levels + 1
+        np.testing.assert_allclose(found.moved, expected.moved, rtol=1e-9, atol=1e-12 * problem.force_scale)
+        assert found.objective == expected.objective
+
+
+def test_readings_between_the_levels_feel_the_friction_of_two(problem: Problem) -> None:
+    readings = problem.readings
+    between = replace(problem, readings=replace(readings, level=np.full_like(readings.level, -1)))
+    climb = climb_of(between, "creep")
+    assert len(climb._offsets) == 1 + len(climb.names)

@@ -1,0 +1,55 @@
+"""What the page says of structure that no set of causes removes."""
+
+from __future__ import annotations
+
+import pytest
+
+from mpam_calib.criticism.load_cell import FAULT
+from mpam_calib.model.effect import effect
+from mpam_calib.report.unremoved import CELL_FAULTS, unremoved
+
+FAULTLESS = {
+    **dict.fromkeys(
+        ("saturated_share", "repeating_N", "bursts_N", "hum_N", "step_N", "chatter_N", "remainder_N"), 0.0
+    ),
+    "load_cell_nats": None,
+    "load_cell_fault": "load_cell",
+}
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("load_cell", "dead weights up to the blocked force"),
+        ("load_cell:zeroed", "with the muscle unhooked"),
+        ("load_cell:rescaled", "its plug and its range"),
+    ],
+)
+@pytest.mark.parametrize(("nats", "by"), [(12.0, "better"), (-2.0, "nearly as well")])
+def test_a_load_cell_at_fault_is_told_with_how_to_look_at_it(
+    fault: str, said: str, nats: float, by: str
+) -> None:
+    (text,) = unremoved(FAULTLESS | {"load_cell_nats": nats, "load_cell_fault": fault})
+    assert said in text
+    assert f"explains the readings {by}" in text
+
+
+def test_every_fault_of_the_load_cell_has_words() -> None:
+    assert set(CELL_FAULTS) == {FAULT, *(f"{FAULT}:{form}" for form in effect(FAULT).forms)}
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("repeating_N", "in every stroke at the same place"),
+        ("bursts_N", "a loose plug"),
+        ("hum_N", "a regulator that hunts"),
+        ("chatter_N", "a guide that chatters"),
+        ("step_N", "use a finer range"),
+        ("remainder_N", "beside every set tried"),
+    ],
+)
+def test_a_fault_is_told_with_its_size_and_what_may_cause_it(fault: str, said: str) -> None:
+    (text,) = unremoved(FAULTLESS | {fault: 1.234})
+    assert "1.23 N" in text
+    assert said in text
