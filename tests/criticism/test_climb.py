@@ -20,8 +20,8 @@ from .test_hypotheses import problem_of, specimen_of
 def problem(request: pytest.FixtureRequest) -> Problem:
     """Friction of its own at every level."""
     specimen = specimen_of("develop-separable-028")
-    declared = specimen.simulation.model_copy(update={"friction": request.param, "friction_by_pressure": True})
-    return problem_of(replace(specimen, simulation=declared))
+    update = {"friction": request.param, "friction_by_pressure": True}
+    return problem_of(replace(specimen, simulation=specimen.simulation.model_copy(update=update)))
 
 
 def climb_of(problem: Problem, form: str) -> Climb:
