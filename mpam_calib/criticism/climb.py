@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from scipy.linalg import lapack
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.bend import is_bend
 from mpam_calib.model.chain import Chain, Unsigned
-from mpam_calib.model.priors import LongTailed, Parameter
+from mpam_calib.model.priors import LongTailed, Parameter, Prior
 
 Array = NDArray[np.float64]
 
@@ -136,10 +137,19 @@ class Climb:
         """The further columns, whitened."""
         return self.problem.white(self.extra, self.size)
 
+    @cached_property
+    def _alike(self) -> list[tuple[Prior, slice]]:
+        """The priors, each with the neighbouring coordinates that share it."""
+        runs = [(prior, len(list(same))) for prior, same in groupby(p.prior for p in self.chain.parameters)]
+        ends = np.cumsum([count for _, count in runs]).tolist()
+        return [(prior, slice(end - count, end)) for (prior, count), end in zip(runs, ends, strict=True)]
+
     def values(self, u: Array) -> dict[str, Array]:
         """Values (B, 1) for coordinates u (B, d)."""
-        found = {q.name: q.prior.from_normal(u[:, i : i + 1]) for i, q in enumerate(self.chain.parameters)}
-        return found or {"": np.zeros((len(u), 1))}
+        if not self.names:
+            return {"": np.zeros((len(u), 1))}
+        every = np.concatenate([prior.from_normal(u[:, alike]) for prior, alike in self._alike], axis=1)
+        return {name: every[:, i : i + 1] for i, name in enumerate(self.names)}
 
     def guide(self) -> Array:
         """The measured force at the lean readings: the first estimate of what depends on the force."""

@@ -37,7 +37,7 @@ def test_noise_knows_no_way(rows: Rows, filtered: str) -> None:
     """Nor does noise whose size differs between strokes, levels and paces, nor one with heavy tails."""
     pace = np.median(np.diff(rows.readings.time))
     slow = np.diff(rows.readings.time, append=rows.readings.time[-1] + pace) > 1.5 * pace
-    for seed in range(40):
+    for seed in range(10):
         noise = noise_of(filtered, rows, seed)
         for uneven in (even(rows), 1.0 + rows.stroke % 3, 1.0 + rows.readings.level, 1.0 + 4.0 * slow):
             assert chatter_rms(rows, noise * uneven, even(rows)) == 0.0

@@ -1,19 +1,33 @@
-"""diagnose from a folder to a folder: what it writes, that it repeats, and that its repair is accepted."""
+"""diagnose from a folder to a folder: what it writes, and that its repair is accepted."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from rig import case as rig_case
 from rig import recipes, sets
 
+from mpam_calib.criticism import diagnose as module
+from mpam_calib.criticism.candidates import Candidates, candidates
+from mpam_calib.criticism.problem import Problem
 from mpam_calib.run.diagnose import diagnose_to_folder
 from mpam_calib.specimen import read
 
 CASE = "develop-separable-016"
 """Coulomb friction and a dead-band, hidden in a muscle with tensile moduli."""
+SUSPECTS = {
+    "coulomb_friction", "dead_band", "length_offset", "force_drift", "creep",
+    "pressure_droop", "tip_shape", "rig_compliance", "stress_softening",
+}  # fmt: skip
+"""What is tried there, and in every fold; :mod:`criticism.test_sample` tries the whole catalogue."""
+
+
+def suspects(problem: Problem) -> Candidates:
+    every = candidates(problem)
+    return replace(every, tested=tuple(e for e in every.tested if e in SUSPECTS))
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +35,9 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, frozenset[str]
     folder = tmp_path_factory.mktemp("diagnose")
     one = recipes.build_case(next(r for r in sets.recipes("develop") if r.name == CASE))
     rig_case.write_case(one, folder / "specimen", folder / "truth.json")
-    diagnose_to_folder(folder / "specimen", folder / "run")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "candidates", suspects)
+        diagnose_to_folder(folder / "specimen", folder / "run")
     return folder / "run", frozenset(one.ids)
 
 
@@ -65,28 +81,25 @@ def test_the_gain_is_measured_on_levels_left_out(runs: tuple[Path, frozenset[str
     assert gain["coverage90_named"] >= 0.8
 
 
-def test_nothing_hidden_is_adequate_and_the_bytes_repeat(tmp_path: Path) -> None:
+def test_nothing_hidden_is_adequate(tmp_path: Path) -> None:
     one = recipes.build_case(next(r for r in sets.recipes("develop") if r.group == "null"))
     rig_case.write_case(one, tmp_path / "specimen", tmp_path / "truth.json")
     with (tmp_path / "specimen" / "specimen.toml").open("a") as toml:
         toml.write("\n[noise]\nrobust = true\n")
-    for name in ("first", "second"):
-        diagnose_to_folder(tmp_path / "specimen", tmp_path / name)
-    first, second = ((tmp_path / name / "diagnosis.json").read_bytes() for name in ("first", "second"))
-    assert first == second
-    content = json.loads(first)
+    diagnose_to_folder(tmp_path / "specimen", tmp_path / "run")
+    content = json.loads((tmp_path / "run" / "diagnosis.json").read_bytes())
     assert (content["verdict"], content["causes"], content["gain"]) == ("adequate", [], None)
     # What could hide even so: sizes and names.
     limits = {limit["id"]: limit["parameters"] for limit in content["limits"]}
     assert {"length_offset", "strand_friction"} <= limits.keys()
     assert {"length_offset"} <= {a for s in content["alternatives"] for a in s["ids"]}
     assert all(band["q05"] < band["q95"] for bands in limits.values() for band in bands.values())
-    page = (tmp_path / "first" / "report.html").read_text()
+    page = (tmp_path / "run" / "report.html").read_text()
     assert "What could hide unseen" in page
     assert ">mm</td>" in page
     assert ">s</td>" not in page  # f_s is no time
     # What was declared and is not used is said on the page.
-    assert "Heavy tails of the noise" in (tmp_path / "first" / "report.html").read_text()
+    assert "Heavy tails of the noise" in (tmp_path / "run" / "report.html").read_text()
 
 
 def test_the_extended_specimen_is_accepted(runs: tuple[Path, frozenset[str]]) -> None:

@@ -84,8 +84,15 @@ def test_a_fixture_that_gives_is_no_load_cell(name: str, truth: set[str]) -> Non
     assert load_cell_rival(found, verdict.leading).lead < -10.0
 
 
-@pytest.mark.parametrize("zero", [True, False])
-@pytest.mark.parametrize("name", ["develop-null-001", "develop-null-007"])
+@pytest.mark.parametrize(
+    ("name", "zero"),
+    [
+        ("develop-null-001", True),
+        ("develop-null-007", False),
+        pytest.param("develop-null-001", False, marks=pytest.mark.long),
+        pytest.param("develop-null-007", True, marks=pytest.mark.long),
+    ],
+)
 def test_a_cell_s_zero_or_gain_at_one_level_is_no_crosshead_s(name: str, zero: bool) -> None:
     """Ten times the noise, constant over one level's readings or in proportion to them."""
     specimen = specimen_of(name)

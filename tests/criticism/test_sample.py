@@ -14,8 +14,8 @@ from rig import sets
 from criticism.score import Scored, score_case
 from mpam_calib.posterior.pool import settle_worker
 
-STRIDES = {"null": 24, "separable": 14, "outside": 7}
-"""One case without a cause, those of one, two and three causes, two from outside the catalogue."""
+STRIDES = {"null": 24, "separable": 14, "outside": 14}
+"""One case without a cause, those of one, two and three causes, one from outside the catalogue."""
 
 
 @pytest.fixture(scope="module")

@@ -74,11 +74,6 @@ def first_of(seeds: range) -> tuple[int, list[int]]:
     return len(seeds) - len(missed), missed
 
 
-def test_the_fourth_order_is_found() -> None:
-    """One muscle as below."""
-    assert first_of(range(8, 9)) == (1, [])
-
-
 @pytest.mark.long
 def test_the_fourth_order_is_found_in_ninety_of_a_hundred(capsys: pytest.CaptureFixture[str]) -> None:
     """Loops of the fourth order with a linear law: the true model first of all that can be told apart.

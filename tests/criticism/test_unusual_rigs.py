@@ -85,7 +85,7 @@ def verdict(made: Unusual, folder: Path) -> tuple[str, frozenset[str]]:
     return found.word, found.standing
 
 
-@pytest.mark.parametrize(("count", "seeds"), [(0, range(2)), (1, range(4)), (2, range(2))])
+@pytest.mark.parametrize(("count", "seeds"), [(0, range(1)), (1, range(3)), (2, range(1))])
 def test_the_truth_leaves_nothing(count: int, seeds: range, tmp_path: Path) -> None:
     for made in drawn(seeds, count):
         assert left(made, tmp_path / made.case.name) < NATS, (made.case.name, made.habits)
@@ -140,10 +140,6 @@ def named(convention: str, seeds: Iterable[int], folder: Path) -> tuple[int, lis
             wrong += [f"{convention}-{seed}"] * (word == "named" and standing != truth)
             count += 1
     return right, wrong, count
-
-
-def test_a_cause_by_another_convention_is_named(tmp_path: Path) -> None:
-    assert named("by_the_stroke", [1], tmp_path) == (1, [], 1)
 
 
 @pytest.mark.long

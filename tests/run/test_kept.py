@@ -200,6 +200,7 @@ def test_results_do_not_mix_with_a_specimen(command: str, muscle: Path, tmp_path
     assert stamps(specimen) == before
 
 
+@pytest.mark.long
 def test_another_command_s_page_is_not_kept_as_a_calibration_s(
     muscle: Path, run_copy: Path, here: Here
 ) -> None:
