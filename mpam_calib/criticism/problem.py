@@ -261,7 +261,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
             loops = loops.without(along_a_ceiling(loops, noise.total))
         beyond = 1.0 - len(loops.force_N) / every
         looked_at = telling_strokes(loops.clear)
-        bins = bin_loops(loops, int(np.clip(ROWS // len(looked_at), 6, 32)), finest=1)
+        bins = bin_loops(loops, int(np.clip(ROWS // len(looked_at), 8, 32)), finest=1)
         n = len(bins)
         keep = np.flatnonzero(~bins.slack & np.isin(bins.segment, looked_at))
         if noise is None:
