@@ -1,7 +1,7 @@
 """Chatter: one way the readings scatter far more than on the way back, at the same pace.
 
-A load cell does not know which way a muscle moves. A braid that sticks and slips does (Rabinowicz 1965,
-chapter 4), and where it slips elsewhere in every cycle it passes for noise, in half of the strokes.
+A load cell does not know which way a muscle moves. A braid that sticks and slips does (Rabinowicz 1965), and
+where it slips elsewhere in every cycle it passes for noise, in half of the strokes.
 """
 
 from __future__ import annotations
