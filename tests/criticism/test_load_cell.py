@@ -51,7 +51,7 @@ def through(cell: Callable[[Array], Array], name: str, tested: tuple[str, ...]) 
     ("cell", "name"),
     [
         (all_the_way, "develop-null-001"),
-        (at_the_top, "develop-null-010"),
+        pytest.param(at_the_top, "develop-null-010", marks=pytest.mark.long),
         pytest.param(below_a_ceiling, "develop-null-010", marks=pytest.mark.long),
     ],
 )

@@ -103,6 +103,7 @@ def test_the_truth_leaves_nothing_in_nineteen_of_twenty(
     assert np.mean(np.array(list(misfit.values())) < NATS) >= 0.95
 
 
+@pytest.mark.long
 def test_nothing_is_named_where_nothing_is_hidden(tmp_path: Path) -> None:
     (made,) = drawn([1], 0)
     assert verdict(made, tmp_path / made.case.name) == ("adequate", frozenset()), made.habits
