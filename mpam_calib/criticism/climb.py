@@ -127,9 +127,8 @@ class Climb:
     def _moved(self, force: Array) -> Array:
         """What a STEP of each size makes of the force (1 + moves, n) at the offsets, (n, d)."""
         moved = (force[1:] - force[0])[self._moves].T
-        _, first, _ = self.problem.lean
-        level = self.problem.lean[0].level[first]
-        moved[:, : self._by_level] *= level[:, None] == np.arange(self._by_level)
+        readings, first, _ = self.problem.lean
+        moved[:, : self._by_level] *= readings.level[first, None] == np.arange(self._by_level)
         return np.asarray(moved)
 
     @cached_property

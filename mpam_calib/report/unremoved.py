@@ -21,36 +21,31 @@ CELL_FAULTS = {
 """What a load cell does that explains the readings, and how to look at it."""
 
 
+FAULTS = {
+    "repeating_N": "a fine structure of {} N comes back in every stroke at the same place",
+    "bursts_N": (
+        "bursts of {} N (over all readings) stand out of their strokes: a loose plug? What cannot be "
+        "recorded again is calibrated with [noise] robust = true"
+    ),
+    "hum_N": (
+        "a hum of {} N, one frequency in all strokes: mains, a pump, a loose shield, a regulator that hunts?"
+    ),
+    "chatter_N": (
+        "the readings scatter by {} N more one way than on the way back: strands that stick and slip, "
+        "a guide that chatters? See whether another speed ends it"
+    ),
+    "step_N": "forces are recorded in steps of {} N, coarser than their noise: use a finer range",
+}
+"""What is said of a fault of so many newtons, and where to look for it."""
+
+
 def unremoved(content: dict[str, Any]) -> list[str]:
     """What no set of causes removes."""
     found = []
     if content["saturated_share"] > 0.0:
         share = significant(100.0 * content["saturated_share"])
         found.append(f"the load cell saturates: {share} % of the readings lie at one extreme force")
-    if content["repeating_N"] > 0.0:
-        size = significant(content["repeating_N"])
-        found.append(f"a fine structure of {size} N comes back in every stroke at the same place")
-    if content["bursts_N"] > 0.0:
-        size = significant(content["bursts_N"])
-        found.append(
-            f"bursts of {size} N (over all readings) stand out of their strokes: a loose plug? What cannot "
-            "be recorded again is calibrated with [noise] robust = true"
-        )
-    if content["hum_N"] > 0.0:
-        size = significant(content["hum_N"])
-        found.append(
-            f"a hum of {size} N, one frequency in all strokes: mains, a pump, a loose shield, "
-            "a regulator that hunts?"
-        )
-    if content["chatter_N"] > 0.0:
-        size = significant(content["chatter_N"])
-        found.append(
-            f"the readings scatter by {size} N more one way than on the way back: strands that stick and "
-            "slip, a guide that chatters? See whether another speed ends it"
-        )
-    if content["step_N"] > 0.0:
-        size = significant(content["step_N"])
-        found.append(f"forces are recorded in steps of {size} N, coarser than their noise: use a finer range")
+    found += [said.format(significant(content[name])) for name, said in FAULTS.items() if content[name] > 0.0]
     if content["load_cell_nats"] is not None:
         by = "better" if content["load_cell_nats"] > 0.0 else "nearly as well"
         cell, look = CELL_FAULTS[content["load_cell_fault"]]

@@ -21,13 +21,6 @@ from .test_structure import NULLS, left
 Array = NDArray[np.float64]
 
 
-@pytest.fixture(scope="module", params=["develop-null-001", "develop-null-003", "develop-null-004"])
-def rows(request: pytest.FixtureRequest) -> Rows:
-    found = problem_of(specimen_of(request.param)).rows
-    assert found is not None
-    return found
-
-
 def even(rows: Rows) -> Array:
     return np.ones(len(rows.force))
 

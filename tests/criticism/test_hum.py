@@ -38,13 +38,6 @@ def noise_of(filtered: str, rows: Rows, seed: int) -> Array:
     return np.asarray(noise / np.std(noise))
 
 
-@pytest.fixture(scope="module", params=["develop-null-001", "develop-null-003", "develop-null-004"])
-def rows(request: pytest.FixtureRequest) -> Rows:
-    found = problem_of(specimen_of(request.param)).rows
-    assert found is not None
-    return found
-
-
 @pytest.mark.parametrize("filtered", FILTERS)
 def test_noise_does_not_hum(rows: Rows, filtered: str) -> None:
     """Nor does noise whose size differs from one stroke to the next."""

@@ -22,13 +22,6 @@ from .test_structure import NULLS, left
 Array = NDArray[np.float64]
 
 
-@pytest.fixture(scope="module", params=["develop-null-001", "develop-null-003", "develop-null-004"])
-def rows(request: pytest.FixtureRequest) -> Rows:
-    found = problem_of(specimen_of(request.param)).rows
-    assert found is not None
-    return found
-
-
 def stroke_s(rows: Rows) -> float:
     """Median duration of a stroke, s."""
     return float(np.median([np.ptp(rows.readings.time[rows.stroke == s]) for s in np.unique(rows.stroke)]))
