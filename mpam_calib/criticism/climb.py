@@ -166,14 +166,14 @@ class Climb:
         factor = np.ones(1)
         if self.chain.uses_force:
             # A force that depends on itself, F = f(F): one Newton step of its fixed point, for all at once.
-            force = fixed + slope * (columns @ eta)
+            force = fixed + slope * columns.times(eta)
             factor = 1.0 / np.clip(1.0 - (force[-1] - force[0]) / nudge, 0.2, 5.0)
 
         def rows(lean: Array) -> Array:
             return 0.5 * (lean.take(first, axis=-1) + lean.take(second, axis=-1))
 
         here = guide + (fixed[0] - guide) * factor
-        per_eta = rows(factor * slope[0] * columns[0].T).T
+        per_eta = rows(factor * slope[0] * columns.first().every()[0].T).T
         white = problem.white(
             np.column_stack([problem.force - (rows(here) + problem.bow), per_eta]), self.size
         )
@@ -181,7 +181,7 @@ class Climb:
         # Given the sizes, the linear coordinates' optimum is exact.
         best = _solve(X.T @ X + np.eye(X.shape[1]), X.T @ white[:, 0])
         residual = white[:, 0] - X @ best
-        force = fixed + slope * (columns @ best[:p])
+        force = fixed + slope * columns.times(best[:p])
         if self.chain.uses_force:
             force = guide + (force - guide) * factor
         force = np.broadcast_to(force, (len(points), len(readings)))[: len(self._offsets)]

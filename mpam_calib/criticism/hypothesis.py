@@ -70,9 +70,10 @@ class Hypothesis:
         """Log posterior density (B,) of coordinates u (B, d)."""
         n, B = len(self.problem), len(u)
         values = {q.name: q.prior.from_normal(u[:, i : i + 1]) for i, q in enumerate(self.parameters)}
-        fixed, slope, columns, _ = self.chain.factored(
+        fixed, slope, linear, _ = self.chain.factored(
             values or {"": np.zeros((B, 1))}, self.problem.readings, self.guide
         )
+        columns = linear.every()
         fixed = np.broadcast_to(fixed, (B, 2 * n))
         slope = np.broadcast_to(slope, (B, 2 * n))
         residual = self._whitened((self.problem.force - 0.5 * (fixed[:, :n] + fixed[:, n:])).T).T

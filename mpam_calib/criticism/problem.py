@@ -195,7 +195,7 @@ class Problem:
         """
         made = replace(self, noise=scale**2 * self.noise, tied=scale * self.tied)
         made.__dict__.update({name: getattr(self, name) for name in ("model", "lean", "bow")})
-        made.__dict__["axes"] = self.axes.scaled(scale)
+        made.__dict__.update(root=self.root.scaled(scale), axes=self.axes.scaled(scale))
         return made
 
     def with_free_strokes(self) -> Problem:

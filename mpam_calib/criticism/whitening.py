@@ -47,6 +47,10 @@ class Whitening:
         own = np.asarray(self.apart @ columns)
         return np.asarray(own - (self.axes * self.shrink) @ (self.axes.T @ own))
 
+    def scaled(self, scale: float) -> Whitening:
+        """The same for scale²·C: built anew, rounding would leave S full."""
+        return Whitening(self.apart * (1.0 / scale), self.axes, self.shrink)
+
 
 @dataclass(frozen=True)
 class Axes:

@@ -12,6 +12,7 @@ stroke instead of the stroke, or a zero that comes back, has a factor that passe
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.curves import over_mean
 from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.readings import Readings
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
@@ -110,14 +112,25 @@ def bend_factor(
     name: str, bends: Mapping[str, int], values: Mapping[str, Array], state: State, setting: Setting
 ) -> Array:
     """exp(Σ c_j P_j(v)), or 1 + Σ c_j P_j(v) along POLYNOMIAL drivers, for every reading, (B, n)."""
-    log: Array = np.asarray(values.get(f"{name}{BENDS}0", np.zeros((1, 1))))
-    factor = np.ones((1, 1))
-    number = 0
-    for driver, degree in bends.items():
-        v = np.atleast_2d(np.clip(DRIVERS[driver](state, setting), -1.5, 1.5))
-        c = [values[f"{name}{BENDS}{number + j}"] for j in range(1, degree + 1)]
-        number += degree
-        total = _series(c, v)
+    first, *others = (f"{name}{BENDS}{j}" for j in range(sum(bends.values()) + 1))
+    constant = values.get(first, np.zeros_like(values[others[0]]))
+    coefficients = np.concatenate([constant, *(values[other] for other in others)], axis=1)
+    bases = {driver: _basis(driver, degree, state, setting) for driver, degree in bends.items()}
+    if any(basis.shape[1] > 1 for basis in bases.values()):
+        return _factor(coefficients, bases)
+    # Where a climb moves one parameter after the other, most of them are none of these.
+    moved = (coefficients != coefficients[0]).any(axis=1)
+    factor = _factor(np.concatenate([coefficients[:1], coefficients[moved]]), bases)
+    return np.asarray(factor[np.where(moved, np.cumsum(moved), 0)])
+
+
+def _factor(coefficients: Array, bases: Mapping[str, Array]) -> Array:
+    """:func:`bend_factor` of coefficients (B, 1 + degrees), c_0 first, and the bases of the drivers."""
+    log, factor = coefficients[:, :1], np.ones((1, 1))
+    first = 1
+    for driver, basis in bases.items():
+        total = _series(coefficients[:, first : first + len(basis)], basis)
+        first += len(basis)
         if driver in POLYNOMIAL:
             factor = factor * (1.0 + total)
         else:
@@ -125,11 +138,34 @@ def bend_factor(
     return np.asarray(factor * np.exp(np.clip(log, -MOST, MOST)))
 
 
-def _series(coefficients: list[Array], v: Array) -> Array:
-    """Σ c_j P_j(v), (B, n), of Legendre polynomials from the first on; c_j (B, 1), v (B or 1, n)."""
+@dataclass
+class _Kept:
+    """The bases for the readings and the setting last seen: a climb looks at the same ones many times."""
+
+    readings: Readings | None = None
+    setting: Setting | None = None
+    bases: dict[tuple[str, int], Array] = field(default_factory=dict)
+
+
+_kept = _Kept()
+
+
+def _basis(driver: str, degree: int, state: State, setting: Setting) -> Array:
+    """Legendre polynomials of a driver from the first to that degree, (degree, B or 1, n)."""
+    if _kept.readings is not state.readings or _kept.setting is not setting:
+        _kept.readings, _kept.setting, _kept.bases = state.readings, setting, {}
+    if driver != "force" and (driver, degree) in _kept.bases:
+        return _kept.bases[driver, degree]
+    v = np.atleast_2d(np.clip(DRIVERS[driver](state, setting), -1.5, 1.5))
     basis = [v]
-    for j in range(1, len(coefficients)):
+    for j in range(1, degree):
         basis.append(((2 * j + 1) * v * basis[-1] - j * (basis[-2] if j > 1 else 1.0)) / (j + 1))
-    if len(v) == 1:  # alike for all: one product of matrices
-        return np.asarray(np.concatenate(coefficients, axis=1) @ np.concatenate(basis))
-    return np.asarray(sum(c * p for c, p in zip(coefficients, basis, strict=True)))
+    _kept.bases[driver, degree] = np.stack(basis)
+    return _kept.bases[driver, degree]
+
+
+def _series(coefficients: Array, basis: Array) -> Array:
+    """Σ c_j P_j(v), (B, n), of coefficients (B, degree) and a basis (degree, B or 1, n)."""
+    if basis.shape[1] == 1:  # alike for all: one product of matrices
+        return np.asarray(coefficients @ basis[:, 0])
+    return np.asarray(np.einsum("bj,jbn->bn", coefficients, basis))

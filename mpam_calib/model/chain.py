@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mpam_calib.model.effect import Effect, Stage, Values
 from mpam_calib.model.effect import effect as effect_by_id
 from mpam_calib.model.friction import DeclaredFriction
-from mpam_calib.model.moduli import ModuliBlock, rate_parameters
+from mpam_calib.model.moduli import Columns, ModuliBlock, rate_parameters
 from mpam_calib.model.nuisance import apply_nuisances, nuisance_parameters
 from mpam_calib.model.priors import Parameter
 from mpam_calib.model.readings import Readings
@@ -44,7 +44,7 @@ class Terms(NamedTuple):
 
 
 class Factors(NamedTuple):
-    """F = fixed + slope·(columns·η): newtons, shapes (B, n), (B or 1, n) and (B or 1, n, p).
+    """F = fixed + slope·(columns·η): newtons, shapes (B, n), (B or 1, n) and, multiplied out, (B or 1, n, p).
 
     ``beside`` (B or 1, n) is the part of the fixed force, N, that is none of the muscle's pull: friction that
     is not in proportion to it, and the load cell's zero.
@@ -52,7 +52,7 @@ class Factors(NamedTuple):
 
     fixed: Array
     slope: Array
-    columns: Array
+    columns: Columns
     beside: Array
 
 
@@ -63,7 +63,7 @@ class Unsigned(NamedTuple):
     """
 
     fixed: Array
-    columns: Array
+    columns: Columns
     beside: Array
     state: State
 
@@ -138,13 +138,13 @@ class Chain:
         the fixture is stiff.
         """
         fixed, slope, columns, _ = self.factored(values, readings, guide)
-        return Terms(fixed, np.broadcast_to(slope, fixed.shape)[..., None] * columns)
+        return Terms(fixed, np.broadcast_to(slope, fixed.shape)[..., None] * columns.every())
 
     def factored(self, values: Values, readings: Readings, guide: Array | None = None) -> Factors:
         """:meth:`terms` as (fixed, slope, columns): F = fixed + slope·(columns·η).
 
-        The slope (B or 1, n) is what friction and gain make of the muscle's own force; the columns are
-        (1, n, p) where no parameter changes them.
+        The slope (B or 1, n) is what friction and gain make of the muscle's own force; multiplied out the
+        columns are (1, n, p) where no parameter changes them.
         """
         return self.unsigned(values, readings, guide).pulling(guide)
 
@@ -178,7 +178,7 @@ class Chain:
         """Force (B, n), N, where what depends on the force is fed with a guide (B or 1, n)."""
         state = self._to_shape(values, readings, guide)
         fixed, columns = self._statics(state, values)
-        free = fixed + np.einsum("...np,...p->...n", columns, eta) if columns.shape[-1] else fixed
+        free = fixed + columns.times(eta) if columns.size else fixed
         state = self._to_sensor(state, values)
         free = state.gain * free
         friction = state.friction_gain * state.coulomb * np.abs(free) * state.sign
@@ -196,22 +196,20 @@ class Chain:
         shape = swollen(SHAPES[state.kinematics](length, state.rest), state.rest, state.swell)
         return replace(state, shape=shape)
 
-    def _statics(self, state: State, values: Values) -> tuple[Array, Array]:
+    def _statics(self, state: State, values: Values) -> tuple[Array, Columns]:
         state = self._stage(Stage.STATICS, state, values)
         P, shape = state.pressure, state.shape
         assert shape is not None
         fixed = gas_force(P, shape) + state.wall_factor * thickness_force(P, shape) - state.lost
         if self.moduli is None:
-            return fixed, np.zeros((*fixed.shape, 0))
+            return fixed, Columns.none(fixed.shape[1])
         simulation = self.setting.simulation
         # Only history changes the bladder's stress itself; its factor belongs to these columns.
         gain = self._stage(Stage.HISTORY, state, values).wall_gain
         per_modulus = modulus_columns(shape, state.rest, simulation.strain, simulation.order)
         readings = state.readings
-        mean, columns = self.moduli.columns(readings.pressure, readings.level, per_modulus, values)
-        if np.all(gain == 1.0):
-            return fixed + mean, columns
-        return fixed + gain * mean, (gain + np.zeros(mean.shape))[..., None] * columns
+        known, columns = self.moduli.columns(readings.pressure, readings.level, per_modulus, gain, values)
+        return fixed + known, columns
 
     def _to_sensor(self, state: State, values: Values) -> State:
         state = self.friction.apply(state, values)

@@ -9,6 +9,7 @@ block's coordinates η ~ N(0, I) give forces Q η of root mean square ``scale``;
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +150,51 @@ def _orthogonal(columns: Array) -> Array:
     return coefficients
 
 
+class Columns(NamedTuple):
+    """Force per coordinate η, N, not multiplied out: gain·(h ⊗ per modulus)·transform.
+
+    ``h`` (B or 1, n, terms, order or 1), ``per_modulus`` (B or 1, n, order), ``gain`` (B or 1, n or 1),
+    ``transform`` (B or 1, q, p).
+    """
+
+    h: Array
+    per_modulus: Array
+    gain: Array
+    transform: Array
+
+    @classmethod
+    def none(cls, n: int) -> Columns:
+        """No moduli: n readings, no coordinates."""
+        return cls(np.zeros((1, n, 0, 1)), np.zeros((1, n, 1)), np.ones((1, 1)), np.zeros((1, 0, 0)))
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates p."""
+        return int(self.transform.shape[2])
+
+    def first(self) -> Columns:
+        """Of the first parameter vector alone."""
+        return Columns(*(part[:1] for part in self))
+
+    def every(self) -> Array:
+        """Multiplied out, (B or 1, n, p)."""
+        natural = self.h * self.per_modulus[:, :, None, :]
+        found = natural.reshape(*natural.shape[:2], -1) @ self.transform
+        return found if np.all(self.gain == 1.0) else self.gain[..., None] * found
+
+    def times(self, eta: Array) -> Array:
+        """Force (B or 1, n), N, for coordinates η (p,) or (B, p)."""
+        return self.of((self.transform @ np.atleast_2d(eta)[..., None])[..., 0])
+
+    def of(self, coefficients: Array) -> Array:
+        """Force (B or 1, n), N, of coefficients (B or 1, q): through the moduli at every reading."""
+        terms, order = self.h.shape[2], self.per_modulus.shape[2]
+        each = coefficients.reshape(-1, 1, terms, order)
+        moduli = self.h[..., 0] @ each[:, 0] if self.h.shape[3] == 1 else (self.h * each).sum(axis=2)
+        force = sum(self.per_modulus[..., k] * moduli[..., k] for k in range(order))
+        return np.asarray(self.gain * force)
+
+
 @dataclass(frozen=True)
 class ModuliBlock:
     """The linear block: a law, its prior mean and how its coordinates become coefficients.
@@ -213,18 +259,16 @@ class ModuliBlock:
         return self._cache["grid"]
 
     def columns(
-        self, pressure: Array, level: Ints, per_modulus: Array, values: Values
-    ) -> tuple[Array, Array]:
-        """Force without the data's say and per coordinate: (B, n), (B, n, p).
+        self, pressure: Array, level: Ints, per_modulus: Array, gain: Array, values: Values
+    ) -> tuple[Array, Columns]:
+        """Force without the data's say and per coordinate: (B or 1, n), and :class:`Columns`.
 
-        ``per_modulus`` (B, n, order) is the force per unit of each modulus.
+        ``per_modulus`` (B or 1, n, order) is the force per unit of each modulus, ``gain`` (B or 1, n or 1) a
+        factor on the bladder's stress.
         """
-        h = self.law.basis(pressure, level, values)
-        natural = h * per_modulus[:, :, None, :]
-        natural = natural.reshape(*natural.shape[:2], -1)
         mean, matrix = self.transform(values)
-        fixed = natural @ mean[0] if self.mean is not None else np.zeros(natural.shape[:2])
-        return fixed, natural @ matrix
+        columns = Columns(self.law.basis(pressure, level, values), per_modulus, gain, matrix)
+        return columns.of(mean) if self.mean is not None else np.zeros((1, len(pressure))), columns
 
     def coefficients(self, eta: Array, values: Values) -> Array:
         """Coefficients (B, q) of coordinates (B, p)."""

@@ -240,7 +240,8 @@ class Collapsed:
         """Bins whose noise is Gaussian and alike in all of them."""
         assert self.model.chain is not None
         white, correlated, time, rough = self._noise(values)
-        fixed, slope, columns, _ = self.model.chain.factored(values, bins.readings, self.guide.bins)
+        fixed, slope, linear, _ = self.model.chain.factored(values, bins.readings, self.guide.bins)
+        columns = linear.every()
         n, B, p = len(bins), len(white), columns.shape[-1]
         slope = 0.5 * np.broadcast_to(slope, (len(slope), 2 * n))
         known = np.empty((p + 1, B, n))
@@ -316,9 +317,9 @@ class Collapsed:
         """Bins without correlated noise and remainder: all rows count, at less cost."""
         assert self.model.chain is not None
         nodes = bins.nodes
-        fixed, slope, columns, _ = self.model.chain.factored(values, nodes.readings, self._node_guide)
+        fixed, slope, linear, _ = self.model.chain.factored(values, nodes.readings, self._node_guide)
         white = values[WHITE][:, 0]
-        piece = white_terms(nodes, bins.averaged, fixed, slope, columns, white)
+        piece = white_terms(nodes, bins.averaged, fixed, slope, linear.every(), white)
         return Piece(*piece).widened(sum(self.model.linear_sizes))
 
     def _points(self, values: Values, points: Points, slack: list[Slack], free: list[FreeRows]) -> Piece:

@@ -19,8 +19,10 @@ def test_it_whitens_the_covariance(ties: int, blocks: int) -> None:
     covariance = apart + tied @ tied.T
     found = Whitening.build(covariance, tied)
     assert len(found) == n
-    assert sparse.issparse(found.apart) == (blocks == 30)
+    scaled = found.scaled(3.0)
+    assert sparse.issparse(found.apart) == sparse.issparse(scaled.apart) == (blocks == 30)
     np.testing.assert_allclose(found @ (found @ covariance).T, np.eye(n), atol=1e-8)
+    np.testing.assert_allclose(scaled @ (scaled @ (9.0 * covariance)).T, np.eye(n), atol=1e-8)
     column = rng.standard_normal(n)
     assert (found @ column) @ (found @ column) == pytest.approx(column @ linalg.solve(covariance, column))
 

@@ -275,7 +275,7 @@ def test_coulomb_s_law_goes_by_the_muscle_s_own_pull(friction, effects, sizes):
     readings, eta = readings_of(rows), np.zeros((1, 1))
     force = chain.force(values, eta, readings)
     found = chain.factored(values, readings, force[0])
-    again = found.fixed + found.slope * (found.columns @ eta[0])
+    again = found.fixed + found.slope * found.columns.times(eta[0])
     assert again == pytest.approx(force, abs=1e-9 * np.abs(force).max())
     assert np.sum(np.sign(force) != np.sign(force - found.beside)) > 5, "no such rows"
 
