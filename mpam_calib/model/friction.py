@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ class DeclaredFriction:
 
     setting: Setting
 
-    @property
+    @cached_property
     def names(self) -> list[str]:
         """Names of the sampled factors, one or one for each level."""
         simulation = self.setting.simulation
