@@ -41,7 +41,7 @@ def noise_of(filtered: str, rows: Rows, seed: int) -> Array:
 @pytest.mark.parametrize("filtered", FILTERS)
 def test_noise_does_not_hum(rows: Rows, filtered: str) -> None:
     """Nor does noise whose size differs from one stroke to the next."""
-    for seed in range(40):
+    for seed in range(20):
         noise = noise_of(filtered, rows, seed)
         assert hum_rms(rows, noise) == 0.0
         assert hum_rms(rows, noise * (1.0 + rows.stroke % 3)) == 0.0

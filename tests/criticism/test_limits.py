@@ -113,6 +113,7 @@ def truth_of(name: str) -> tuple[str, ...]:
     return recipes.build_case(next(r for r in sets.recipes("develop") if r.name == name)).ids
 
 
+@pytest.mark.long
 def test_beside_causes_that_are_named_nothing_further_is_seen_but_what_is_there() -> None:
     """Beside both hidden causes no band says that there is more; beside one of them the other's does."""
     inside = []

@@ -76,7 +76,7 @@ def test_noise_of_strokes_at_two_paces_is_told(by_reading: bool) -> None:
     loops = replace(loops, time_s=time, began_s=np.zeros(len(time)))
     curve = 50.0 * (1.0 + loops.level) - 2e3 * loops.displacement_m + 2.0 * loops.branch
     lasts, off = 1.0, []
-    for seed in range(4):
+    for seed in range(2):
         z = np.random.default_rng(seed).standard_normal(len(time) + 1)
         if by_reading:
             noise = z[1:] + 0.5 * z[:-1]
@@ -111,7 +111,7 @@ def test_noise_is_told_where_each_cycle_has_a_pace_of_its_own(ripple: float) -> 
     curve = curve + ripple * np.sin(x / (0.6 * np.median(np.abs(np.diff(x)))))
     keep = np.exp(-np.diff(time, prepend=time[0]) / 0.5)
     off = []
-    for seed in range(4):
+    for seed in range(2):
         z = np.random.default_rng(seed).standard_normal((2, len(time)))
         slow = z[0].copy()
         for i in range(1, len(time)):

@@ -159,6 +159,7 @@ def test_what_an_effect_adds_is_not_there_twice() -> None:
         assert len({m.model_dump_json() for m in models}) == len(models)
 
 
+@pytest.mark.long
 def test_without_replicates_there_is_no_confusion(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """And the page has its statement on orders, laws and levels all the same."""
     monkeypatch.setattr(space, "ORDERS", range(2, 4))

@@ -34,7 +34,7 @@ def wave(rows: Rows, each: float) -> Array:
 
 @pytest.mark.parametrize("filtered", [*FILTERS, "as slow as strokes"])
 def test_noise_makes_no_waves(rows: Rows, filtered: str) -> None:
-    for seed in range(40):
+    for seed in range(20):
         if filtered in FILTERS:
             noise = noise_of(filtered, rows, seed)
         else:
@@ -93,7 +93,9 @@ def test_what_differs_from_cycle_to_cycle_is_no_wave(rows: Rows) -> None:
             assert wave_rms(rows, noise + 10.0 * fades * bend) == 0.0
 
 
-@pytest.mark.parametrize("name", ["develop-null-001", "develop-null-004"])
+@pytest.mark.parametrize(
+    "name", ["develop-null-001", pytest.param("develop-null-004", marks=pytest.mark.long)]
+)
 def test_a_regulator_that_hunts_is_unexplained(name: str) -> None:
     """Four times the noise, in proportion to the pressure, two periods in a stroke."""
     specimen = specimen_of(name)

@@ -19,7 +19,8 @@ from . import sbc
 WALKERS, STEPS = 96, 4000
 
 
-@pytest.mark.parametrize("seed", [pytest.param(47, marks=pytest.mark.long), 63])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [47, 63])
 def test_the_tail_of_a_ridge_is_drawn(seed: int) -> None:
     """The tenth of the posterior at the ridge's far end; a mixture alone finds some thousandths of it, and
     where it seems to fit (the second seed), half.

@@ -53,6 +53,7 @@ def test_the_error_is_what_it_says():
     assert abs(np.mean(away)) < 1.0
 
 
+@pytest.mark.long
 def test_far_bent_tips():
     """Where the tips hold few points the errors are too small, by a factor of three; the figure holds."""
     density = Curved(0.5)

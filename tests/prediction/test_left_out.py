@@ -72,6 +72,7 @@ def test_a_law_that_is_wrong_in_pressure_is_told_though_every_level_fits():
     assert (np.sign(inner["bias_N"]) == (-1.0) ** np.arange(1, 6)).all()
 
 
+@pytest.mark.long
 def test_rows_that_are_means_have_the_noise_of_means(sound):
     specimen, many = sound.specimen, 25
     table = told(
@@ -86,6 +87,7 @@ def test_rows_that_are_means_have_the_noise_of_means(sound):
     assert abs(table["inside90"].mean() - 0.90) < 0.05
 
 
+@pytest.mark.long
 def test_readings_that_noise_lifts_above_a_floor_are_foreseen_by_nobody(sound):
     """The same test, driven on until every level is slack: its table is that of the readings that pull."""
     loops = sound.specimen.loops
