@@ -55,7 +55,9 @@ def _slack_terms(slack: Slack, eta: Array, wrong: float) -> tuple[Array, Array, 
     log_cdf = special.log_ndtr(z) + np.log1p(-wrong)
     # φ/Φ by the scaled error function: both underflow far from the floor.
     ratio = np.sqrt(2.0 / np.pi) / special.erfcx(-z / np.sqrt(2.0))
-    log_term = np.logaddexp(log_cdf, np.log(wrong)) if wrong else log_cdf
+    # Far out of the prior there may be no number here: such a vector counts as impossible.
+    with np.errstate(invalid="ignore"):
+        log_term = np.logaddexp(log_cdf, np.log(wrong)) if wrong else log_cdf
     share = np.exp(log_cdf - log_term)
     curvature = share * ratio * (z + ratio) - share * (1.0 - share) * ratio**2
     return log_term.sum(axis=1), share * ratio / slack.sd, np.clip(curvature, 0.0, 1.0) / slack.sd**2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy import integrate, stats
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.bins import bin_loops
+from mpam_calib.posterior.slack import Slack, with_slack
 from mpam_calib.posterior.target import build_target
 from mpam_calib.specimen.declaration import Sensors
 from mpam_calib.specimen.recording import ForceMap
@@ -140,3 +142,19 @@ def test_no_bin_holds_what_a_floor_made_of_the_force(rows):
         assert np.abs(off[~bins.slack]).max() < 6.0
         assert bins.slack[exact < -2.0 * NOISE].all()
         assert not bins.slack[exact > 8.0 * NOISE].any()
+
+
+def test_a_vector_without_a_number_says_nothing_and_spoils_no_other():
+    rng = np.random.default_rng(2)
+    slack = Slack(
+        rng.uniform(-1.0, 1.0, (2, 4)), rng.standard_normal((2, 4, 1)), np.zeros((2, 4)), np.ones((2, 4))
+    )
+    others = np.full((2, 1, 1), 3.0), np.ones((2, 1)), np.ones(2)
+    alone = with_slack(*others, [slack])
+    slack.fixed[0] = np.nan
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = with_slack(*others, [slack])
+    for whole, part in zip(alone, found, strict=True):
+        assert np.isnan(part[0]).any()
+        np.testing.assert_allclose(part[1], whole[1], rtol=1e-12)
