@@ -59,7 +59,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "force_drift": (
         *("bent", "settling", "settling-bent", "tared", "tared-bent"),
-        *("early", "power", "root", "thermal", "return"),
+        *("early", "power", "root", "thermal", "return", "swing"),
     ),
     "pressure_droop": (
         *("bent", "level", "level-bent", "power", "level-power"),

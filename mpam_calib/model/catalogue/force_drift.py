@@ -9,7 +9,7 @@ import numpy as np
 from mpam_calib.model.bend import EARLY
 from mpam_calib.model.curves import half_test, settled, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import LogNormal, LongTailed, Parameter
+from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.units import MINUTE
 
@@ -84,6 +84,22 @@ def _return(state: State, values: Values, setting: Setting) -> State:
     return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
 
 
+def _swing(state: State, values: Values, setting: Setting) -> State:
+    """With a period and a phase of its own, as fast on average up to half the test as the line."""
+    half = half_test(setting)
+    turn = 2.0 * np.pi * half / values["swing_s"]
+    phase = values["swing_phase"]
+    path = half * np.sin(turn * state.readings.time / half + phase)
+    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+
+
+def _period(setting: Setting) -> tuple[Parameter, ...]:
+    return (
+        Parameter("swing_s", LogNormal(3.0 * half_test(setting), 0.6), "period of the swing"),
+        Parameter("swing_phase", Normal(0.0, 1.0), "phase of the swing when the test begins", "", "rad"),
+    )
+
+
 register(
     Effect(
         id="force_drift",
@@ -102,20 +118,22 @@ register(
             "root": _root,
             "thermal": _thermal,
             "return": _return,
+            "swing": _swing,
         },
-        own={"early": _before, "power": _exponent, "thermal": _time},
+        own={"early": _before, "power": _exponent, "thermal": _time, "swing": _period},
         sources={
             "early": "the same line, from before the first reading",
             "power": "textbook: quadratic, or any other power",
             "root": "textbook: heat conducted into a thick body, square root of time",
             "thermal": "textbook: Newton's law of cooling, 1 − exp(−t/τ)",
             "return": "textbook: half a period of a sine over the test",
+            "swing": "textbook: a sine, as the room's temperature swings",
         },
         kinds={
             "settling": "most of it early in the test",
             "tared": "here anew in each file, as if tared before",
         },
-        bends={"time": 5},
+        bends={"time": 9},
         looseness=4.0,
         added=True,
     )
