@@ -201,6 +201,28 @@ def test_a_drift_that_settles_ends_where_the_straight_one_does() -> None:
     assert np.all(late > straight)
 
 
+@pytest.mark.parametrize(("period", "phase"), [(40.0, 0.5), (250.0, -1.2)])
+def test_a_zero_that_swings_is_a_sine_of_time(period: float, phase: float) -> None:
+    """z″ = −(2π/T)² z, of the size that the line has at half the test; where it stands at first is free."""
+    setting = setting_for("force_drift:swing")
+    readings = replace(rows(setting), time=np.linspace(0.0, setting.duration, 40))
+    given = {
+        "drift_N_per_min": np.array([[0.3]]),
+        "swing_s": np.array([[period]]),
+        "swing_phase": np.array([[phase]]),
+    }
+    start = Chain(setting, None, False).start(readings, np.zeros(1))
+    (zero,) = effect("force_drift:swing").apply(start, given, setting).zero
+    step = readings.time[1]
+    between = 2.0 * np.cos(2.0 * np.pi * step / period) * zero[1:-1]
+    np.testing.assert_allclose(zero[2:] + zero[:-2], between, atol=1e-10)
+    size = 0.3 * 0.5 * setting.duration
+    assert zero[0] == pytest.approx(size * np.sin(phase))
+    assert (zero[1] - zero[0]) / step == pytest.approx(
+        2.0 * np.pi / period * size * np.cos(phase + np.pi * step / period), rel=0.01
+    )
+
+
 def test_a_drift_that_comes_back_passes_its_zero() -> None:
     """Added bends: with no size at all the slope is sd·Σ c_j P_j; at the test's end, where P_j = 1, too."""
     form = "force_drift:tared-bent"

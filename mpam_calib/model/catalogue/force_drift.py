@@ -85,11 +85,9 @@ def _return(state: State, values: Values, setting: Setting) -> State:
 
 
 def _swing(state: State, values: Values, setting: Setting) -> State:
-    """With a period and a phase of its own, as fast on average up to half the test as the line."""
-    half = half_test(setting)
-    turn = 2.0 * np.pi * half / values["swing_s"]
-    phase = values["swing_phase"]
-    path = half * np.sin(turn * state.readings.time / half + phase)
+    """With a period and a phase of its own, as large as the line at half the test."""
+    turned = 2.0 * np.pi * state.readings.time / values["swing_s"] + values["swing_phase"]
+    path = half_test(setting) * np.sin(turned)
     return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
 
 
