@@ -209,7 +209,7 @@ def test_a_zero_that_swings_is_a_sine_of_time(period: float, phase: float) -> No
     given = {
         "drift_N_per_min": np.array([[0.3]]),
         "swing_s": np.array([[period]]),
-        "swing_phase": np.array([[phase]]),
+        "swing_phase_deg": np.array([[phase]]),
     }
     start = Chain(setting, None, False).start(readings, np.zeros(1))
     (zero,) = effect("force_drift:swing").apply(start, given, setting).zero

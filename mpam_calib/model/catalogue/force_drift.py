@@ -86,7 +86,7 @@ def _return(state: State, values: Values, setting: Setting) -> State:
 
 def _swing(state: State, values: Values, setting: Setting) -> State:
     """With a period and a phase of its own, as large as the line at half the test."""
-    turned = 2.0 * np.pi * state.readings.time / values["swing_s"] + values["swing_phase"]
+    turned = 2.0 * np.pi * state.readings.time / values["swing_s"] + values["swing_phase_deg"]
     path = half_test(setting) * np.sin(turned)
     return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
 
@@ -94,7 +94,7 @@ def _swing(state: State, values: Values, setting: Setting) -> State:
 def _period(setting: Setting) -> tuple[Parameter, ...]:
     return (
         Parameter("swing_s", LogNormal(3.0 * half_test(setting), 0.6), "period of the swing"),
-        Parameter("swing_phase", Normal(0.0, 1.0), "phase of the swing when the test begins", "", "rad"),
+        Parameter("swing_phase_deg", Normal(0.0, 1.0), "phase of the swing when the test begins"),
     )
 
 
