@@ -21,7 +21,7 @@ SAMPLE = (
     "develop-separable-014",
     "develop-outside-000",
 )
-"""One case without a cause, those of one, two and three causes, one from outside the catalogue: few strokes."""
+"""Of few strokes: without a cause, with one, two and three, and from outside the catalogue."""
 
 
 @pytest.fixture(scope="module")
