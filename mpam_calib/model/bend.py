@@ -116,10 +116,10 @@ def bend_factor(
     constant = values.get(first, np.zeros_like(values[others[0]]))
     coefficients = np.concatenate([constant, *(values[other] for other in others)], axis=1)
     bases = {driver: _basis(driver, degree, state, setting) for driver, degree in bends.items()}
-    if any(basis.shape[1] > 1 for basis in bases.values()):
-        return _factor(coefficients, bases)
     # Where a climb moves one parameter after the other, most of them are none of these.
     moved = (coefficients != coefficients[0]).any(axis=1)
+    if moved[1:].all() or any(basis.shape[1] > 1 for basis in bases.values()):
+        return _factor(coefficients, bases)
     factor = _factor(np.concatenate([coefficients[:1], coefficients[moved]]), bases)
     return np.asarray(factor[np.where(moved, np.cumsum(moved), 0)])
 
