@@ -12,7 +12,6 @@ stroke instead of the stroke, or a zero that comes back, has a factor that passe
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -138,30 +137,30 @@ def _factor(coefficients: Array, bases: Mapping[str, Array]) -> Array:
     return np.asarray(factor * np.exp(np.clip(log, -MOST, MOST)))
 
 
-@dataclass
-class _Kept:
-    """The bases for the readings and the setting last seen: a climb looks at the same ones many times."""
-
-    readings: Readings | None = None
-    setting: Setting | None = None
-    bases: dict[tuple[str, int], Array] = field(default_factory=dict)
+_kept: list[tuple[Readings, Setting, dict[tuple[str, int], Array]]] = []
+"""The readings and the setting last seen, with their bases: a climb looks at the same ones many times."""
 
 
-_kept = _Kept()
+def _bases_of(readings: Readings, setting: Setting) -> dict[tuple[str, int], Array]:
+    """What is known of these readings so far."""
+    last = _kept[0] if _kept else None
+    if last is None or last[0] is not readings or last[1] is not setting:
+        last = readings, setting, {}
+        _kept[:] = [last]
+    return last[2]
 
 
 def _basis(driver: str, degree: int, state: State, setting: Setting) -> Array:
     """Legendre polynomials of a driver from the first to that degree, (degree, B or 1, n)."""
-    if _kept.readings is not state.readings or _kept.setting is not setting:
-        _kept.readings, _kept.setting, _kept.bases = state.readings, setting, {}
-    if driver != "force" and (driver, degree) in _kept.bases:
-        return _kept.bases[driver, degree]
+    bases = _bases_of(state.readings, setting)
+    if driver != "force" and (driver, degree) in bases:  # the force is the state's own
+        return bases[driver, degree]
     v = np.atleast_2d(np.clip(DRIVERS[driver](state, setting), -1.5, 1.5))
     basis = [v]
     for j in range(1, degree):
         basis.append(((2 * j + 1) * v * basis[-1] - j * (basis[-2] if j > 1 else 1.0)) / (j + 1))
-    _kept.bases[driver, degree] = np.stack(basis)
-    return _kept.bases[driver, degree]
+    bases[driver, degree] = np.stack(basis)
+    return bases[driver, degree]
 
 
 def _series(coefficients: Array, basis: Array) -> Array:
