@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpam_calib.model.bend import BENDS, DRIVERS, MOST
+from mpam_calib.model.bend import BENDS, DRIVERS, MOST, bend_factor
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.effect import Values, bent, effect, known_effects
 from mpam_calib.model.readings import FAR, Readings
@@ -288,3 +288,17 @@ def test_creep_of_the_bladder_is_a_gain_on_its_stress() -> None:
     expected = 1.0 - 0.05 * np.log10(1.0 + readings.time_at_level)
     np.testing.assert_allclose(relaxed.wall_gain[0], expected, rtol=1e-12)
     assert relaxed.gain is state.gain
+
+
+def test_bases_that_are_kept_belong_to_their_readings_and_their_setting() -> None:
+    """And vectors of which some bend are as each by itself."""
+    setting = setting_for("creep:bent")
+    longer, readings = replace(setting, stroke=2.0 * setting.stroke), rows(setting)
+    later = replace(readings, displacement=0.5 * readings.displacement)
+    c = np.array([[0.0], [0.3], [0.0], [-0.2]])
+    values, bends = {f"size{BENDS}1": c}, {"contraction": 1}
+    for found, where, share in ((setting, readings, 1.0), (longer, readings, 0.5), (longer, later, 0.25)):
+        state = Chain(found, None, False).start(where, np.zeros(1))
+        expected = 1.0 + c * (2.0 * share * readings.displacement / setting.stroke - 1.0)
+        for _ in range(2):
+            np.testing.assert_allclose(bend_factor("size", bends, values, state, found), expected)
