@@ -189,7 +189,7 @@ class Columns(NamedTuple):
     def of(self, coefficients: Array) -> Array:
         """Force (B or 1, n), N, of coefficients (B or 1, q): through the moduli at every reading."""
         terms, order = self.h.shape[2], self.per_modulus.shape[2]
-        each = coefficients.reshape(-1, 1, terms, order)
+        each = coefficients.reshape(len(coefficients), 1, terms, order)
         moduli = self.h[..., 0] @ each[:, 0] if self.h.shape[3] == 1 else (self.h * each).sum(axis=2)
         force = sum(self.per_modulus[..., k] * moduli[..., k] for k in range(order))
         return np.asarray(self.gain * force)

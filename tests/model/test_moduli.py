@@ -10,7 +10,7 @@ from physics import plain
 
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.model import Model, build_model
-from mpam_calib.model.moduli import ModuliBlock
+from mpam_calib.model.moduli import Columns, ModuliBlock
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.reference import GRID_POINTS, geometric_contraction
 from mpam_calib.posterior.draws import Draws, reported
@@ -283,3 +283,22 @@ def test_every_quantity_of_a_summary_says_what_it_is(law):
 def test_levels_that_are_the_same_have_no_labels():
     with pytest.raises(ValueError, match="not apart"):
         level_labels([1e5, 1e5])
+
+
+@pytest.mark.parametrize("order", [None, 1, 3])
+@pytest.mark.parametrize("batch", [1, 4])
+def test_columns_say_the_same_multiplied_out_or_not(order: int | None, batch: int) -> None:
+    """With functions of pressure that all moduli share (None), or of each one's own; a gain of the stress."""
+    rng = np.random.default_rng(3)
+    n, terms, orders = 7, 2, order or 3
+    h = rng.standard_normal((batch, n, terms, order or 1))
+    gain, transform = rng.uniform(0.5, 1.5, (batch, n)), rng.standard_normal((1, terms * orders, 5))
+    columns = Columns(h, rng.standard_normal((1, n, orders)), gain, transform)
+    assert columns.size == 5
+    for eta in (rng.standard_normal(5), rng.standard_normal((batch, 5))):
+        by_hand = np.einsum("bnp,bp->bn", columns.every(), np.broadcast_to(eta, (batch, 5)))
+        np.testing.assert_allclose(columns.times(eta), by_hand, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(columns.first().every(), columns.every()[:1])
+    none = Columns.none(n)
+    assert none.size == 0 and none.every().shape == (1, n, 0)
+    np.testing.assert_array_equal(none.times(np.zeros(0)), np.zeros((1, n)))
