@@ -15,6 +15,7 @@ from mpam_calib.errors import InputError
 def simulate(
     specimen: Annotated[Path, typer.Argument(help="specimen folder or its specimen.toml")],
     output: Annotated[Path, typer.Option("-o", "--output", help="the specimen folder to write")],
+    more: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
     hide: Annotated[list[str] | None, typer.Option(help="ID or ID=VALUE of an effect to hide")] = None,
     seed: Annotated[int, typer.Option(help="seed of the noise", min=0)] = 0,
 ) -> None:
@@ -23,12 +24,14 @@ def simulate(
     from mpam_calib.run.synthetic import demand_synthetic_folder, write_specimen
     from mpam_calib.specimen import read
 
+    if more and not hide:
+        raise InputError("simulate", f'"{more[0]}"', "one specimen")
     source = specimen / "specimen.toml" if specimen.is_dir() else specimen
     if output.resolve() == source.parent.resolve():
         raise InputError(output, "the specimen's own folder", "another folder")
     demand_synthetic_folder(output)
     real = read(specimen, data_required=False)
-    made = make(real, _sizes(hide or []), seed)
+    made = make(real, _sizes([*(hide or []), *(more or [])]), seed)
     write_specimen(made, source, output)
     left = [file.name for file in real.files if file.kind in ("blocked_force", "free_contraction")]
     if left:

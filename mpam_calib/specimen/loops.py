@@ -145,7 +145,10 @@ def _read_file(file: DataFile, averaged: int, floor_N: float | None) -> tuple[pd
         if averaged > 1:
             block, censored = average_rows(block, averaged, censored)
         kept.append(block.assign(censored=censored.astype(float)))
-    return pd.concat(kept), clock
+    frame = pd.concat(kept)
+    if "branch" in frame and not frame["branch"].any():
+        frame = frame.drop(columns="branch")  # empty all along: not given
+    return frame, clock
 
 
 def censored_rows(frame: pd.DataFrame, floor_N: float | None) -> Bools:

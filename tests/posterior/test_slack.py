@@ -158,3 +158,22 @@ def test_a_vector_without_a_number_says_nothing_and_spoils_no_other():
     for whole, part in zip(alone, found, strict=True):
         assert np.isnan(part[0]).any()
         np.testing.assert_allclose(part[1], whole[1], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("declared", "recorded", "floor"),
+    [(None, 2.0, 2.0), (None, -3.0, 0.0), (0.5, 2.0, 0.5), (-1.0, 2.0, -1.0)],
+)
+def test_without_a_declared_floor_it_is_what_flagged_readings_read(declared, recorded, floor):
+    """But for a muscle that pushes: its flags say that it does not pull."""
+    flagged = np.arange(20) >= 15
+    force = np.where(flagged, recorded, 10.0)
+    gamma = np.linspace(0.0, 0.3, 20)
+    grid = ForceMap(np.full(20, 1.5e5), gamma, force, np.zeros(20, int), np.zeros(20, int), flagged)
+    made = build.specimen(
+        {"law": "constant", "order": 1, "friction": "none"},
+        levels_kPa=(150.0,),
+        force_map=grid,
+        sensors=Sensors(force_sd_N=NOISE, force_floor_N=declared),
+    )
+    assert build_target(made, draw_blueprint(made, build.PLAIN)).data.floor == floor

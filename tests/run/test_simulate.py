@@ -40,6 +40,20 @@ def test_a_size_that_a_rig_may_have_is_hidden_and_told(muscle: Path, tmp_path: P
     assert truth["hidden"]["dead_band"] == {"P_DB_kPa": 7.5}
 
 
+def test_several_effects_may_follow_one_hide(muscle: Path, tmp_path: Path, here: Here) -> None:
+    for folder, hide in (
+        ("one", ["--hide", "dead_band=7.5", "creep=0.01"]),
+        ("each", ["--hide", "dead_band=7.5", "--hide", "creep=0.01"]),
+    ):
+        assert here("simulate", muscle, "-o", tmp_path / folder, *hide).code == 0
+    one, each = (json.loads((tmp_path / name / "truth.json").read_text()) for name in ("one", "each"))
+    assert one == each
+    assert set(one["hidden"]) == {"dead_band", "creep"}
+    result = here("simulate", muscle, "creep", "-o", tmp_path / "none")
+    assert (result.code, result.complaint) == (2, 'error: simulate: found "creep", expected one specimen')
+    assert not (tmp_path / "none").exists()
+
+
 @pytest.mark.parametrize("effect", ["braid_kinematics", "coulomb_friction", "dead_band"])
 def test_what_the_simulation_has_already_cannot_be_hidden(effect: str, tmp_path: Path, here: Here) -> None:
     specimen = Specimen(simulation=SIMULATION + 'effects = ["dead_band"]\n')

@@ -112,6 +112,18 @@ def test_one_file_for_each_pressure_with_its_own_clock(tmp_path: Path) -> None:
     assert any("begins anew in 2 of 3 files" in note for note in specimen.notes)
 
 
+def test_a_column_of_empty_branches_says_no_more_than_none(tmp_path: Path) -> None:
+    header, *lines = loops((50.0, 150.0), cycles=2, rate=20.0).text().splitlines()
+    bare = "\n".join([header, *lines]) + "\n"
+    empty = "\n".join([f"{header},branch", *(f"{line}," for line in lines)]) + "\n"
+    without, given = (
+        loops_of(read(make(tmp_path / name, loops=text))) for name, text in (("a", bare), ("b", empty))
+    )
+    assert set(np.unique(given.branch)) == {-1, 1}
+    np.testing.assert_array_equal(given.branch, without.branch)
+    np.testing.assert_array_equal(given.cycle, without.cycle)
+
+
 def test_given_branches_and_cycles_are_kept(tmp_path: Path) -> None:
     recording = loops((50.0, 100.0))
     body = recording.text().splitlines()
