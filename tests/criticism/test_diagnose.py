@@ -20,7 +20,7 @@ CASE = "develop-separable-016"
 """Coulomb friction and a dead-band, hidden in a muscle with tensile moduli."""
 SUSPECTS = {
     "coulomb_friction", "dead_band", "length_offset", "force_drift", "pressure_droop", "tip_shape",
-    "rig_compliance",
+    "rig_compliance", "strand_friction",
 }  # fmt: skip
 """What is tried there, and in every fold; :mod:`criticism.test_sample` tries the whole catalogue."""
 
@@ -81,11 +81,12 @@ def test_the_gain_is_measured_on_levels_left_out(runs: tuple[Path, frozenset[str
     assert gain["coverage90_named"] >= 0.8
 
 
-def test_nothing_hidden_is_adequate(tmp_path: Path) -> None:
+def test_nothing_hidden_is_adequate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     one = recipes.build_case(next(r for r in sets.recipes("develop") if r.group == "null"))
     rig_case.write_case(one, tmp_path / "specimen", tmp_path / "truth.json")
     with (tmp_path / "specimen" / "specimen.toml").open("a") as toml:
         toml.write("\n[noise]\nrobust = true\n")
+    monkeypatch.setattr(module, "candidates", suspects)
     diagnose_to_folder(tmp_path / "specimen", tmp_path / "run")
     content = json.loads((tmp_path / "run" / "diagnosis.json").read_bytes())
     assert (content["verdict"], content["causes"], content["gain"]) == ("adequate", [], None)

@@ -185,7 +185,10 @@ def test_shares_under_other_priors() -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["a rig's loops", "mpam1_reconstructed", "mpam2_reconstructed"])
+@pytest.mark.parametrize(
+    "name",
+    ["a rig's loops", "mpam1_reconstructed", pytest.param("mpam2_reconstructed", marks=pytest.mark.long)],
+)
 def test_laplace_near_the_top_is_the_quadrature(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """To its next term, at the density's own mode: within 0.02 nat with every size 4 sd or more above 0.
 

@@ -69,7 +69,14 @@ def log_likelihood(problem: Problem, identifier: str, x: Array, beside: frozense
     return np.array(found)
 
 
-@pytest.mark.parametrize("identifier", ["force_drift", "length_offset", "braid_stretch", "pressure_droop"])
+@pytest.mark.parametrize(
+    "identifier",
+    [
+        "length_offset",
+        "braid_stretch",
+        *(pytest.param(e, marks=pytest.mark.long) for e in ("force_drift", "pressure_droop")),
+    ],
+)
 def test_the_band_is_that_of_the_known_posterior(problem: Problem, identifier: str) -> None:
     """Of either sign, and of one: there the density falls off a cliff at nothing."""
     kinds = (f"{identifier}:{kind}" for kind in effect(identifier).kinds)

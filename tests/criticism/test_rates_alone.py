@@ -94,6 +94,7 @@ def test_evidence_is_the_quadrature_s(problem: Problem, law: str, order: int) ->
         np.testing.assert_allclose((found.mean - exact.mean) / sd, 0.0, atol=0.25)
 
 
+@pytest.mark.long
 def test_seeds_differ_by_no_more_than_their_errors(problem: Problem) -> None:
     """Eight rates, where quadrature does not settle."""
     target = rates_of(problem, "exponential_each", "coulomb", 4)

@@ -184,6 +184,7 @@ def undoubted(found: Search) -> Search:
     return Search(found.problem, found.tested, found.spread, fits=dict(found.searched))
 
 
+@pytest.mark.long
 def test_no_set_that_comes_near_is_left_in_a_poor_form() -> None:
     """Two causes in equations of other authors, neither the contract's nor bent ones."""
     problem = problem_of(specimen_of("practice-separable-004", "practice"))

@@ -85,7 +85,7 @@ def verdict(made: Unusual, folder: Path) -> tuple[str, frozenset[str]]:
     return found.word, found.standing
 
 
-@pytest.mark.parametrize(("count", "seeds"), [(0, range(1)), (1, range(1)), (2, range(1))])
+@pytest.mark.parametrize(("count", "seeds"), [(1, range(1)), (2, range(1))])
 def test_the_truth_leaves_nothing(count: int, seeds: range, tmp_path: Path) -> None:
     for made in drawn(seeds, count):
         assert left(made, tmp_path / made.case.name) < NATS, (made.case.name, made.habits)

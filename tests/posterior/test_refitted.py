@@ -43,6 +43,7 @@ def test_two_bends_at_once():
         assert integrate_refitted(Twice(), mode, seed).value == pytest.approx(Twice.exact, abs=ELSEWHERE)
 
 
+@pytest.mark.long
 def test_the_error_is_what_it_says():
     """The misses of many seeds are as large as the stated errors, and do not lean to one side."""
     density = Curved()

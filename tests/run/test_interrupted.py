@@ -213,6 +213,7 @@ def test_ctrl_c_that_got_lost_stops_at_the_next_progress() -> None:
     assert (result.returncode, result.stderr) == (130, b"")
 
 
+@pytest.mark.long
 def test_an_interrupted_diagnosis_goes_on(muscle: Path, tmp_path: Path) -> None:
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     assert run("diagnose", muscle, "-o", whole).code == 0

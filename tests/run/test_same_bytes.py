@@ -38,6 +38,7 @@ def test_one_seed_gives_the_same_bytes_anywhere(
         assert first[group].identical(second[group]), group
 
 
+@pytest.mark.long
 def test_another_seed_agrees_within_its_monte_carlo_error(
     muscle: Path, muscle_run: Path, tmp_path: Path, here: Here
 ) -> None:

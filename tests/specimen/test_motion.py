@@ -73,7 +73,7 @@ def test_strokes_of_different_speeds_meet_at_their_turn(gentle: bool, ratio: flo
     """Slow, fast and slow cycles at full speed into the turn or gently; 5 turns each, no noise."""
     rng = np.random.default_rng(3)
     wrong = []
-    for _ in range(10):
+    for _ in range(20):
         time = 20.0 / np.repeat([1.0, ratio, 1.0], 2)
         ends = np.concatenate([[0.0], np.cumsum(time)])
         t = np.arange(rng.uniform(0.0, 1.0), ends[-1] * ratio * rows / 20.0) * 20.0 / (ratio * rows)
@@ -163,7 +163,7 @@ def test_rows_that_no_motion_tells_are_few_and_known(shape: str, hold: float, qu
     """
     rng = np.random.default_rng(4)
     wrong, unclear, strokes = 0, 0, 0
-    for rows in (20, 60, 200) * 2:
+    for rows in (20, 60, 200) * 4:
         time, cycles = 10.0, 3
         step = time / rows
         t = np.arange(rng.uniform(0.0, step), 2 * cycles * (time + hold), step)

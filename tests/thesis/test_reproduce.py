@@ -147,6 +147,7 @@ def test_numbers_of_the_text(rows: pd.DataFrame) -> None:
         assert cell(rows, *place)["verdict"] == verdict, place
 
 
+@pytest.mark.long
 def test_same_seed_same_bytes_other_seed_same_verdicts(tmp_path: Path) -> None:
     files = []
     for i, seed in enumerate((0, 0, 7)):
