@@ -28,6 +28,7 @@ def test_the_error_is_what_it_says(density: Gaussian | Skewed | Curved) -> None:
     assert all(rounds.count < MOST_ROUNDS for rounds, _ in found)
 
 
+@pytest.mark.long
 def test_what_no_round_met_is_told_of() -> None:
     """Eight of twelve dimensions on sheets 0.02 thin and bent: nats are missed, and the error says so."""
     density = Sheets()
