@@ -109,6 +109,7 @@ def test_seeds_differ_by_no_more_than_their_errors(problem: Problem) -> None:
     assert again.value == value[0] != value[1]
 
 
+@pytest.mark.long
 def test_a_gaussian_that_is_off_is_corrected_or_given_up(problem: Problem) -> None:
     """The free moduli's covariance half as large again: the same evidence. Their mode far off: none."""
     target = rates_of(problem, "exponential_each", "coulomb", 2)

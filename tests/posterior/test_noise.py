@@ -62,6 +62,7 @@ def test_bursts_are_not_taken_for_structure():
     assert found.mean_sd("K_f")[0] == pytest.approx(K_F, abs=0.02)
 
 
+@pytest.mark.long
 def test_robust_noise_does_no_harm_where_there_are_no_bursts():
     """Sds within a tenth, means within half an sd, and degrees of freedom that say: Gaussian."""
     for seed in (0, 1):
@@ -85,6 +86,7 @@ def test_growth_is_recovered(growth):
     assert np.mean(sds) < 0.25 * growth
 
 
+@pytest.mark.long
 def test_growth_is_near_zero_where_there_is_none():
     """A growth of 0.3 is 4 % more noise at the force scale: the data of 2,400 rows allow no more."""
     found = [fitted(loops_with(GROWING, seed=seed)[0], CORRELATED).mean_sd(GROWTH)[0] for seed in SEEDS]

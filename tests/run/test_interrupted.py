@@ -55,6 +55,7 @@ def resume(muscle: Path, folder: Path, whole: dict[str, bytes]) -> None:
         assert after[name] == whole[name], name
 
 
+@pytest.mark.long
 def test_a_run_killed_twice_and_stopped_by_ctrl_c_ends_as_if_nothing_had_been(
     muscle: Path, tmp_path: Path, unbroken: tuple[dict[str, bytes], float]
 ) -> None:
