@@ -15,7 +15,9 @@ from mpam_calib.errors import InputError
 def simulate(
     specimen: Annotated[Path, typer.Argument(help="specimen folder or its specimen.toml")],
     output: Annotated[Path, typer.Option("-o", "--output", help="the specimen folder to write")],
-    more: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
+    more: Annotated[
+        list[str] | None, typer.Argument(metavar="ID", help="further effects, after --hide")
+    ] = None,
     hide: Annotated[list[str] | None, typer.Option(help="ID or ID=VALUE of an effect to hide")] = None,
     seed: Annotated[int, typer.Option(help="seed of the noise", min=0)] = 0,
 ) -> None:

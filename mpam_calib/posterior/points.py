@@ -84,6 +84,15 @@ def gather_points(specimen: Specimen) -> Points | None:
     )
 
 
+def floor_of(declared: float | None, points: Points | None) -> float:
+    """The floor (N) of slack readings: where none is declared what they read, at least nothing."""
+    if declared is not None:
+        return declared
+    if points is None or not points.censored.any():
+        return 0.0
+    return max(float(np.median(points.force[points.censored])), 0.0)
+
+
 @dataclass(frozen=True)
 class TensilePoints:
     """Stress-strain points (n,) in the declared range: strain, stress (Pa), rows behind each."""

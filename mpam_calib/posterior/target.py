@@ -15,7 +15,7 @@ from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.posterior.bins import LoopBins, bin_loops
 from mpam_calib.posterior.collapsed import Collapsed, Data, Guide
 from mpam_calib.posterior.mode import Mode, climb_modes, find_modes
-from mpam_calib.posterior.points import Points, gather_points, gather_tensile
+from mpam_calib.posterior.points import floor_of, gather_points, gather_tensile
 from mpam_calib.posterior.sites import LEAST_SHARE
 from mpam_calib.specimen.recording import Loops, Specimen
 
@@ -47,18 +47,9 @@ def build_target(specimen: Specimen, blueprint: Blueprint) -> Collapsed:
         bins=_bins(specimen.loops, model) if specimen.loops is not None and model.chain else None,
         points=points,
         tensile=tensile,
-        floor=_floor(specimen.sensors.force_floor_N, points),
+        floor=floor_of(specimen.sensors.force_floor_N, points),
     )
     return Collapsed(model, data, _measured(data))
-
-
-def _floor(declared: float | None, points: Points | None) -> float:
-    """The floor (N) of slack readings: where none is declared what the flagged ones read, or nothing."""
-    if declared is not None:
-        return declared
-    if points is None or not points.censored.any():
-        return 0.0
-    return max(float(np.median(points.force[points.censored])), 0.0)
 
 
 def without_level(specimen: Specimen, target: Collapsed, level: int) -> Collapsed:
