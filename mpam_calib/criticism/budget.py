@@ -13,7 +13,7 @@ from scipy import linalg
 from mpam_calib.criticism.fit import Fit
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.refits import Set
-from mpam_calib.criticism.search import Search
+from mpam_calib.criticism.searched import Search
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,8 @@ from mpam_calib.criticism.journal import Journal, journalled
 from mpam_calib.criticism.limits import Band, hidden_sizes
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.refits import Set
-from mpam_calib.criticism.search import LARGEST, Search, search
+from mpam_calib.criticism.search import search
+from mpam_calib.criticism.searched import LARGEST, Search
 from mpam_calib.criticism.structure import Structure, structure_tests
 from mpam_calib.criticism.verdict import Verdict, judge
 from mpam_calib.errors import InputError

@@ -13,7 +13,7 @@ from mpam_calib.criticism.fit import fit
 from mpam_calib.criticism.forms import price
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.refits import Set, ended
-from mpam_calib.criticism.search import Search
+from mpam_calib.criticism.searched import Search
 
 
 def score_beside(found: Search, problem: Problem, effects: Set) -> float:

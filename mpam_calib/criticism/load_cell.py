@@ -15,7 +15,7 @@ import numpy as np
 
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES
 from mpam_calib.criticism.refits import Set, Try, best_of, ended
-from mpam_calib.criticism.search import Search
+from mpam_calib.criticism.searched import Search
 from mpam_calib.model.effect import effect
 
 FAULT = "load_cell"

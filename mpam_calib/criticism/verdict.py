@@ -14,7 +14,7 @@ from mpam_calib.criticism.free_strokes import score_beside
 from mpam_calib.criticism.load_cell import NO_RIVAL, load_cell_rival
 from mpam_calib.criticism.problem import SIZES
 from mpam_calib.criticism.refits import Set
-from mpam_calib.criticism.search import Search
+from mpam_calib.criticism.searched import Search
 
 Word = Literal["adequate", "named", "ambiguous", "unexplained"]
 

@@ -26,7 +26,8 @@ from rig.effects import form as rig_form
 from mpam_calib.criticism.candidates import candidates
 from mpam_calib.criticism.diagnose import DRAWS
 from mpam_calib.criticism.problem import build_problem
-from mpam_calib.criticism.search import Search, search
+from mpam_calib.criticism.search import search
+from mpam_calib.criticism.searched import Search
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Options, draw_blueprint

@@ -10,7 +10,7 @@ import pytest
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.budget import beyond_noise, misfit_budget
 from mpam_calib.criticism.problem import SIZES
-from mpam_calib.criticism.search import Search
+from mpam_calib.criticism.searched import Search
 from mpam_calib.criticism.spread import Alone
 
 CAUSES = frozenset(["coulomb_friction", "dead_band"])

@@ -22,7 +22,7 @@ from rig.recipes import Recipe, Wanted
 from mpam_calib.criticism.fit import fit
 from mpam_calib.criticism.forms import forms_of
 from mpam_calib.criticism.problem import Problem, build_problem
-from mpam_calib.criticism.search import STARTS
+from mpam_calib.criticism.searched import STARTS
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.effect import effect
 from mpam_calib.specimen import read

@@ -13,7 +13,8 @@ import pytest
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism import journal as module
 from mpam_calib.criticism.journal import Journal
-from mpam_calib.criticism.search import Search, _by, search
+from mpam_calib.criticism.search import search
+from mpam_calib.criticism.searched import Search, best_first
 from mpam_calib.criticism.select import Selection, select
 from mpam_calib.posterior.checkpoint import Checkpoint
 
@@ -98,8 +99,8 @@ def test_without_room_nothing_is_kept_and_the_work_goes_on(tmp_path: Path) -> No
 
 def test_sets_that_tie_have_one_order_in_every_process() -> None:
     sets = [frozenset(s) for s in (("presliding", "dead_band"), ("dead_band", "rate_friction"), ("creep",))]
-    assert _by(set(sets), lambda s: 0.0) == [sets[2], sets[0], sets[1]]
-    assert _by(set(sets), lambda s: float("dead_band" in s)) == [sets[0], sets[1], sets[2]]
+    assert best_first(set(sets), lambda s: 0.0) == [sets[2], sets[0], sets[1]]
+    assert best_first(set(sets), lambda s: float("dead_band" in s)) == [sets[0], sets[1], sets[2]]
 
 
 def test_a_search_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:

@@ -18,7 +18,8 @@ from mpam_calib.criticism.fit import chain_for, doubt_on_rows, fit
 from mpam_calib.criticism.forms import flexible, forms_of, price
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.refits import best_of, with_better_forms, with_doubt, with_doubted_equations
-from mpam_calib.criticism.search import NEAR, POLISHED, Search, search
+from mpam_calib.criticism.search import search
+from mpam_calib.criticism.searched import NEAR, POLISHED, Search
 from mpam_calib.criticism.spread import Alone, spread_over
 from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.specimen import read
