@@ -97,6 +97,7 @@ class Climb:
     extra: Array
     rival: float = -np.inf
     _kept: tuple[Array, Unsigned] | None = field(default=None, init=False, repr=False)
+    _sloped: tuple[Place, Array] | None = field(default=None, init=False, repr=False)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -126,10 +127,12 @@ class Climb:
 
     def _moved(self, force: Array) -> Array:
         """What a STEP of each size makes of the force (1 + moves, n) at the offsets, (n, d)."""
-        moved = (force[1:] - force[0])[self._moves].T
-        readings, first, _ = self.problem.lean
-        moved[:, : self._by_level] *= readings.level[first, None] == np.arange(self._by_level)
-        return np.asarray(moved)
+        moved = force[1:] - force[0]
+        if self._by_level:
+            readings, first, _ = self.problem.lean
+            moved = moved[self._moves]
+            moved[: self._by_level] *= readings.level[first] == np.arange(self._by_level)[:, None]
+        return np.asarray(moved.T)
 
     @cached_property
     def _extra(self) -> Array:
@@ -179,7 +182,7 @@ class Climb:
         )
         X = np.concatenate([white[:, 1:], self._extra], axis=1)
         # Given the sizes, the linear coordinates' optimum is exact.
-        best = _solve(X.T @ X + np.eye(X.shape[1]), X.T @ white[:, 0])
+        best = _solve(plus_one(X.T @ X), X.T @ white[:, 0])
         residual = white[:, 0] - X @ best
         force = fixed + slope * columns.times(best[:p])
         if self.chain.uses_force:
@@ -207,8 +210,11 @@ class Climb:
         return self._kept[1]
 
     def slopes(self, place: Place) -> Array:
-        """Whitened changes of the force with all coordinates, (n, d + q)."""
-        return np.concatenate([self.problem.white(place.moved / STEP, self.size), place.columns], axis=1)
+        """Whitened changes of the force with all coordinates, (n, d + q); the last ones are kept."""
+        if self._sloped is None or self._sloped[0] is not place:
+            white = self.problem.white(place.moved / STEP, self.size)
+            self._sloped = place, np.concatenate([white, place.columns], axis=1)
+        return self._sloped[1]
 
     @cached_property
     def _still(self) -> float:
@@ -269,7 +275,7 @@ class Climb:
         furthest = furthest_of(self.chain.parameters)
         released = not bends.any() or bool(np.any(u[bends] != 0.0))
         best: Place | None = None
-        J = np.empty((0, 0))
+        hessian, gradient = np.empty((0, 0)), np.empty(0)
         damping, promise, shortened = 1e-3, 0.0, False
         for _round in range(ROUNDS):
             place = look(u, guide, eta)
@@ -283,6 +289,8 @@ class Climb:
                 damping *= 4.0 if kept < KEPT[0] else 0.2 if kept > KEPT[1] else 1.0
                 damping = max(damping, 1e-6)
                 best, J = place, self.slopes(place)
+                hessian = plus_one(J.T @ J)
+                gradient = J.T @ best.residual - np.concatenate([best.u, best.eta])
             else:
                 waiting = False
                 damping = max(8.0 * damping, RIDGE)
@@ -291,13 +299,10 @@ class Climb:
             # What depends on the force is fed with the model's own.
             guide, eta = best.guide, best.eta[: self.chain.linear_size]
             misfit = float(best.residual @ best.residual)
-            hessian = J.T @ J + np.eye(J.shape[1])
-            gradient = J.T @ best.residual - np.concatenate([best.u, best.eta])
-            free = np.ones(len(hessian), dtype=bool)
-            free[:d] = ((np.abs(best.u) < furthest) | (best.u * gradient[:d] < 0.0)) & (released | ~bends)
-            damped = hessian[np.ix_(free, free)] + damping * np.diag(np.diagonal(hessian)[free])
-            step = np.zeros(len(hessian))
-            step[free] = _solve(damped, gradient[free])
+            stuck = (np.abs(best.u) >= furthest) & (best.u * gradient[:d] >= 0.0)
+            if not released:
+                stuck |= bends
+            step = _damped(hessian, gradient, damping, stuck)
             promise = 0.5 * float(step @ gradient)
             if released and damping < RIDGE and best.objective + HOPE * promise < self.rival - SHORT:
                 break
@@ -311,6 +316,24 @@ class Climb:
             u = np.clip(best.u + step[:d], -furthest, furthest)
         assert best is not None
         return best
+
+
+def plus_one(matrix: Array) -> Array:
+    """The matrix (k, k), to which the prior's is added in place."""
+    matrix.flat[:: len(matrix) + 1] += 1.0
+    return matrix
+
+
+def _damped(hessian: Array, gradient: Array, damping: float, stuck: NDArray[np.bool_]) -> Array:
+    """Levenberg's and Marquardt's step (k,), without the first coordinates where they are ``stuck`` (d,)."""
+    damped, right = hessian.copy(), gradient
+    damped.flat[:: len(damped) + 1] *= 1.0 + damping
+    if stuck.any():
+        held = np.flatnonzero(stuck)
+        damped[held], damped[:, held], damped[held, held] = 0.0, 0.0, 1.0
+        right = gradient.copy()
+        right[held] = 0.0
+    return _solve(damped, right)
 
 
 def _solve(matrix: Array, right: Array) -> Array:

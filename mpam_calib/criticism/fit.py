@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from mpam_calib.criticism.climb import Climb, Place
+from mpam_calib.criticism.climb import Climb, Place, plus_one
 from mpam_calib.criticism.doubt import doubts
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.blueprint import Blueprint
@@ -182,7 +182,7 @@ def _fitted(effects: frozenset[str], climb: Climb, place: Place, doubt: float) -
     problem, p = climb.problem, climb.chain.linear_size
     eta, zeta = np.split(place.eta, [p])
     J = climb.slopes(place)
-    hessian = J.T @ J + np.eye(J.shape[1])
+    hessian = plus_one(J.T @ J)
     factor = linalg.cho_factor(hessian, lower=True)
     log_det = 2.0 * float(np.sum(np.log(np.diagonal(factor[0]))))
     constant = problem.log_dets[climb.size] + len(problem) * np.log(2.0 * np.pi)

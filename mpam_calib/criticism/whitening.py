@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,11 @@ class Whitening:
     def __matmul__(self, columns: Array) -> Array:
         """W·columns, (n, ...)."""
         own = np.asarray(self.apart @ columns)
-        return np.asarray(own - (self.axes * self.shrink) @ (self.axes.T @ own))
+        return np.asarray(own - self._shrunk @ (self.axes.T @ own))
+
+    @cached_property
+    def _shrunk(self) -> Array:
+        return self.axes * self.shrink
 
     def scaled(self, scale: float) -> Whitening:
         """The same for scale²·C: built anew, rounding would leave S full."""

@@ -12,12 +12,14 @@ stroke instead of the stroke, or a zero that comes back, has a factor that passe
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.curves import over_mean
+from mpam_calib.model.distinct import over_distinct
 from mpam_calib.model.priors import Normal, Parameter
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.state import Setting, State
@@ -111,16 +113,19 @@ def bend_factor(
     name: str, bends: Mapping[str, int], values: Mapping[str, Array], state: State, setting: Setting
 ) -> Array:
     """exp(Σ c_j P_j(v)), or 1 + Σ c_j P_j(v) along POLYNOMIAL drivers, for every reading, (B, n)."""
-    first, *others = (f"{name}{BENDS}{j}" for j in range(sum(bends.values()) + 1))
+    first, *others = _names(name, sum(bends.values()))
     constant = values.get(first, np.zeros_like(values[others[0]]))
     coefficients = np.concatenate([constant, *(values[other] for other in others)], axis=1)
     bases = {driver: _basis(driver, degree, state, setting) for driver, degree in bends.items()}
-    # Where a climb moves one parameter after the other, most of them are none of these.
-    moved = (coefficients != coefficients[0]).any(axis=1)
-    if moved[1:].all() or any(basis.shape[1] > 1 for basis in bases.values()):
+    if any(basis.shape[1] > 1 for basis in bases.values()):
         return _factor(coefficients, bases)
-    factor = _factor(np.concatenate([coefficients[:1], coefficients[moved]]), bases)
-    return np.asarray(factor[np.where(moved, np.cumsum(moved), 0)])
+    return over_distinct(coefficients, lambda some: _factor(some, bases))
+
+
+@lru_cache(maxsize=1024)
+def _names(name: str, degrees: int) -> tuple[str, ...]:
+    """The coefficients' names, c_0 first."""
+    return tuple(f"{name}{BENDS}{j}" for j in range(degrees + 1))
 
 
 def _factor(coefficients: Array, bases: Mapping[str, Array]) -> Array:

@@ -7,8 +7,9 @@ for known η.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from mpam_calib.model.readings import Readings
 from mpam_calib.model.reference import rest_of
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.friction import coulomb_factor, strand_friction_per_f_s
-from mpam_calib.physics.kinematics import SHAPES, SHORTEST, swollen
+from mpam_calib.physics.kinematics import SHAPES, SHORTEST, Rest, swollen
 from mpam_calib.physics.statics import gas_force, modulus_columns, thickness_force
 
 Array = NDArray[np.float64]
@@ -150,9 +151,8 @@ class Chain:
 
     def unsigned(self, values: Values, readings: Readings, guide: Array | None = None) -> Unsigned:
         """:meth:`factored` but for the pull's signs: alike for all guides without :attr:`uses_force`."""
-        state = self._to_shape(values, readings, np.zeros(len(readings)) if guide is None else guide)
+        state = self._through(values, readings, np.zeros(len(readings)) if guide is None else guide)
         fixed, columns = self._statics(state, values)
-        state = self._to_sensor(state, values)
         return Unsigned(fixed, columns, self._friction_beside(state) + state.zero, state)
 
     def force(self, values: Values, eta: Array, readings: Readings) -> Array:
@@ -176,46 +176,42 @@ class Chain:
 
     def _force_given(self, guide: Array, values: Values, eta: Array, readings: Readings) -> Array:
         """Force (B, n), N, where what depends on the force is fed with a guide (B or 1, n)."""
-        state = self._to_shape(values, readings, guide)
+        state = self._through(values, readings, guide)
         fixed, columns = self._statics(state, values)
-        free = fixed + columns.times(eta) if columns.size else fixed
-        state = self._to_sensor(state, values)
-        free = state.gain * free
+        free = state.gain * (fixed + columns.times(eta) if columns.size else fixed)
         friction = state.friction_gain * state.coulomb * np.abs(free) * state.sign
         friction = friction + _tightened(state) * free
         return np.asarray(free + friction + self._friction_beside(state) + state.zero)
 
-    def _to_shape(self, values: Values, readings: Readings, guide: Array) -> State:
+    def _through(self, values: Values, readings: Readings, guide: Array) -> State:
+        """The state behind all stages; what the muscle's own force comes to is not reckoned yet."""
         state = self.start(readings, guide)
         if self.with_nuisances:
             state = apply_nuisances(state, values)
         state = self._stage(Stage.RIG, state, values)
-        state = replace(state, length=state.rest.L0 - state.displacement)
+        state = state._replace(length=state.rest.L0 - state.displacement)
         state = self._stage(Stage.SHAPE, state, values)
         length = np.maximum(state.length, SHORTEST * state.rest.L0)
         shape = swollen(SHAPES[state.kinematics](length, state.rest), state.rest, state.swell)
-        return replace(state, shape=shape)
+        state = self._stage(Stage.STATICS, state._replace(shape=shape), values)
+        state = self.friction.apply(state, values)
+        for stage in (Stage.FRICTION, Stage.HISTORY, Stage.SENSOR):
+            state = self._stage(stage, state, values)
+        return state
 
     def _statics(self, state: State, values: Values) -> tuple[Array, Columns]:
-        state = self._stage(Stage.STATICS, state, values)
         P, shape = state.pressure, state.shape
         assert shape is not None
         fixed = gas_force(P, shape) + state.wall_factor * thickness_force(P, shape) - state.lost
         if self.moduli is None:
             return fixed, Columns.none(fixed.shape[1])
         simulation = self.setting.simulation
-        # Only history changes the bladder's stress itself; its factor belongs to these columns.
-        gain = self._stage(Stage.HISTORY, state, values).wall_gain
         per_modulus = modulus_columns(shape, state.rest, simulation.strain, simulation.order)
         readings = state.readings
-        known, columns = self.moduli.columns(readings.pressure, readings.level, per_modulus, gain, values)
+        known, columns = self.moduli.columns(
+            readings.pressure, readings.level, per_modulus, state.wall_gain, values
+        )
         return fixed + known, columns
-
-    def _to_sensor(self, state: State, values: Values) -> State:
-        state = self.friction.apply(state, values)
-        for stage in (Stage.FRICTION, Stage.HISTORY, Stage.SENSOR):
-            state = self._stage(stage, state, values)
-        return state
 
     def _friction_beside(self, state: State) -> Array:
         """Friction (N) beside what is in proportion to the force; history acts on it as on the force."""
@@ -228,21 +224,29 @@ class Chain:
         return result
 
     def _stage(self, stage: Stage, state: State, values: Values) -> State:
-        for item in self.effects:
-            if item.stage == stage:
-                state = item.apply(state, values, self.setting)
+        for item in self._at_stage.get(stage, ()):
+            state = item.apply(state, values, self.setting)
         return state
+
+    @cached_property
+    def _at_stage(self) -> dict[Stage, tuple[Effect, ...]]:
+        """The declared effects by where they act."""
+        return {stage: tuple(at) for stage, at in groupby(self.effects, key=lambda e: e.stage)}
+
+    @cached_property
+    def _rest(self) -> Rest:
+        """The declared geometry at rest."""
+        return rest_of(self.setting.geometry)
 
     def start(self, readings: Readings, guide: Array) -> State:
         """The state before any stage: the recording as it is, nothing corrected."""
         zero, one = np.zeros((1, 1)), np.ones((1, 1))
-        geometry = self.setting.geometry
         return State(
             readings=readings,
             guide=np.atleast_2d(guide),
             pressure=readings.pressure[None, :],
             displacement=readings.displacement[None, :],
-            rest=rest_of(geometry),
+            rest=self._rest,
             kinematics=self.setting.simulation.kinematics,
             swell=one,
             length=zero,

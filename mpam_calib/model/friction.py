@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -57,8 +57,8 @@ class DeclaredFriction:
         else:
             factor = self._at(state.readings, np.concatenate([values[name] for name in names], axis=1))
         if self.setting.simulation.friction == "coulomb":
-            return replace(state, coulomb=state.coulomb + factor)
-        return replace(state, strand=state.strand + factor)
+            return state._replace(coulomb=state.coulomb + factor)
+        return state._replace(strand=state.strand + factor)
 
     def _at(self, readings: Readings, factors: Array) -> Array:
         """The factors (B, levels) at the readings, (B, n): that of the own level, else interpolated."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mpam_calib.model.effect import Values
@@ -43,7 +41,7 @@ def apply_nuisances(state: State, values: Values) -> State:
     # A sampled wall must stay inside its tube, or no shape exists.
     rest = state.rest._replace(**changed)
     rest = rest._replace(t0=np.minimum(rest.t0, 0.999 * rest.R0))
-    state = replace(state, rest=rest)
+    state = state._replace(rest=rest)
     if BIAS in values:
-        state = replace(state, pressure=np.maximum(state.pressure + values[BIAS], 0.0))
+        state = state._replace(pressure=np.maximum(state.pressure + values[BIAS], 0.0))
     return state

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,8 +52,7 @@ class Setting:
         return float(self.levels[-1])
 
 
-@dataclass(frozen=True)
-class State:
+class State(NamedTuple):
     """Arrays of shape (B, n) or broadcastable to it: B parameter vectors, n readings.
 
     rig: ``pressure`` (Pa) and ``displacement`` (m) that the muscle really sees.

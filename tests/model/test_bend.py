@@ -152,7 +152,7 @@ def test_friction_in_proportion_to_speed_does_not_know_the_force() -> None:
     form = "rate_friction:viscous"
     setting = setting_for(form)
     readings = rows(setting)
-    start = replace(Chain(setting, None, False).start(readings, np.zeros(1)), coulomb=np.array([[0.05]]))
+    start = Chain(setting, None, False).start(readings, np.zeros(1))._replace(coulomb=np.array([[0.05]]))
     moved = effect(form).apply(start, {"rate_per_decade": np.array([[0.4]])}, setting)
     per_decade = 0.4 * 0.05 * setting.force_scale
     expected = per_decade * readings.speed / setting.speed / np.log(10.0)

@@ -152,7 +152,7 @@ def test_strands_that_stretch_grow_longer_and_store_energy() -> None:
     setting = setting_for(form)
     before = start(setting, rows(setting))
     length = before.rest.L0 - before.displacement
-    shaped = replace(before, length=length, shape=SHAPES[before.kinematics](length, before.rest))
+    shaped = before._replace(length=length, shape=SHAPES[before.kinematics](length, before.rest))
     values = {"braid_factor": one(1.3)}
     both, longer, energy = (
         effect(f).apply(shaped, values, setting) for f in (form, "braid_stretch:longer", "braid_stretch")

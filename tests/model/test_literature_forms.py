@@ -365,7 +365,7 @@ def test_a_preloaded_fixture_is_stiff_up_to_its_preload() -> None:
     setting = setting_for("rig_compliance:preload")
     scale = setting.force_scale
     values = {"compliance_mm_per_N": np.array([[1e-5]]), "preload_N": np.array([[0.2 * scale]])}
-    held = replace(start(setting, rows(setting, 4)), guide=scale * np.array([[0.1, 0.2, 0.6, 1.0]]))
+    held = start(setting, rows(setting, 4))._replace(guide=scale * np.array([[0.1, 0.2, 0.6, 1.0]]))
     moved = effect("rig_compliance:preload").apply(held, values, setting).displacement - held.displacement
     np.testing.assert_allclose(moved, 1e-5 * scale * np.array([[0.0, 0.0, 0.5, 1.0]]), atol=1e-15)
 

@@ -30,7 +30,7 @@ def _parameters(setting):
 
 
 def _apply(state, values, setting):
-    return replace(state, zero=state.zero + values["swing_N"] * np.sin(5.0 * state.readings.time))
+    return state._replace(zero=state.zero + values["swing_N"] * np.sin(5.0 * state.readings.time))
 
 
 @pytest.fixture

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mpam_calib.model.curves import middle_pressure, power
@@ -22,7 +20,7 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
     alpha0 = np.clip(state.rest.alpha0 + values["delta_alpha_deg"], *LIMITS)
-    return replace(state, rest=state.rest._replace(alpha0=alpha0))
+    return state._replace(rest=state.rest._replace(alpha0=alpha0))
 
 
 def _seating(state: State, values: Values, setting: Setting) -> State:

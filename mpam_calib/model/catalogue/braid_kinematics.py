@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
@@ -17,27 +15,27 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
     # Bent, the strands may lie outside the surface, and the radius then grows more than Eq. 2.10 says.
-    return replace(state, kinematics="inextensible_braid", swell=values.get("braid_kinematics", state.swell))
+    return state._replace(kinematics="inextensible_braid", swell=values.get("braid_kinematics", state.swell))
 
 
 def _swell(state: State, values: Values, setting: Setting) -> State:
     """Strands outside the wall's surface, or a wall not wholly against them: the growth times one factor."""
-    return replace(_apply(state, values, setting), swell=np.maximum(values["braid_swell"], 0.05))
+    return _apply(state, values, setting)._replace(swell=np.maximum(values["braid_swell"], 0.05))
 
 
 def _thickness(state: State, values: Values, setting: Setting) -> State:
     """The radius follows the strands and the wall still keeps its thickness."""
-    return replace(state, kinematics="braid_of_constant_thickness")
+    return state._replace(kinematics="braid_of_constant_thickness")
 
 
 def _thin(state: State, values: Values, setting: Setting) -> State:
     """The radius follows the strands and the wall's volume is reckoned as a thin wall's."""
-    return replace(state, kinematics="braid_of_thin_wall")
+    return state._replace(kinematics="braid_of_thin_wall")
 
 
 def _section(state: State, values: Values, setting: Setting) -> State:
     """The radius follows the strands and the wall thins as it is stretched round."""
-    return replace(state, kinematics="braid_of_thin_section")
+    return state._replace(kinematics="braid_of_thin_section")
 
 
 def _factor(setting: Setting) -> tuple[Parameter, ...]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from mpam_calib.model.curves import middle_pressure, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import HalfLongTailed, LogNormal, Parameter
@@ -28,7 +26,7 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     braid = setting.braid
     assert braid is not None  # reading refuses this effect without [braid]
     loss = braid_energy_force(state.pressure, state.length, state.rest, braid.E_br, braid.R_br, braid.n)
-    return replace(state, lost=state.lost + values["braid_factor"] * loss)
+    return state._replace(lost=state.lost + values["braid_factor"] * loss)
 
 
 def _power(state: State, values: Values, setting: Setting) -> State:
@@ -44,7 +42,7 @@ def _longer(state: State, values: Values, setting: Setting) -> State:
     assert state.shape is not None
     strain = strand_strain(state.pressure, state.length, state.rest, braid.E_br, braid.R_br, braid.n)
     strain = values["braid_factor"] * strain
-    return replace(state, shape=with_longer_strands(state.shape, state.rest, state.kinematics, strain))
+    return state._replace(shape=with_longer_strands(state.shape, state.rest, state.kinematics, strain))
 
 
 def _both(state: State, values: Values, setting: Setting) -> State:

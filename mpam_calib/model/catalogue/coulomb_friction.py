@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mpam_calib.model.curves import power
@@ -27,14 +25,14 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    return replace(state, coulomb=state.coulomb + values["K_f"])
+    return state._replace(coulomb=state.coulomb + values["K_f"])
 
 
 def _constant(state: State, values: Values, setting: Setting) -> State:
     """A part of it is the same at any force; at the force scale it is all K_f times the force."""
     constant = values["K_f"] * values["constant_share"]
     drag = state.drag + constant * setting.force_scale
-    return replace(state, coulomb=state.coulomb + values["K_f"] - constant, drag=drag)
+    return state._replace(coulomb=state.coulomb + values["K_f"] - constant, drag=drag)
 
 
 def _share(setting: Setting) -> tuple[Parameter, ...]:
@@ -44,13 +42,13 @@ def _share(setting: Setting) -> tuple[Parameter, ...]:
 def _capstan(state: State, values: Values, setting: Setting) -> State:
     """Strands wound round the bladder: F·exp(μs), sinh μ = K_f, which lifts the loop's middle as well."""
     lifted = np.sqrt(1.0 + values["K_f"] ** 2) - 1.0
-    return replace(_apply(state, values, setting), tightening=state.tightening + lifted)
+    return _apply(state, values, setting)._replace(tightening=state.tightening + lifted)
 
 
 def _power(state: State, values: Values, setting: Setting) -> State:
     """A power of the force, as large at the force scale: contacts that spread under load."""
     part = power(np.abs(state.guide) / setting.force_scale, values["force_exponent"] - 1.0)
-    return replace(state, coulomb=state.coulomb + values["K_f"] * part)
+    return state._replace(coulomb=state.coulomb + values["K_f"] * part)
 
 
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:

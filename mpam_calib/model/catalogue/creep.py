@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +82,7 @@ def _whole(decades: Decades) -> Apply:
 
     def apply(state: State, values: Values, setting: Setting) -> State:
         gain = 1.0 - values["creep_per_decade"] * decades(state, values, setting)
-        return replace(state, gain=state.gain * gain)
+        return state._replace(gain=state.gain * gain)
 
     return apply
 
@@ -93,7 +92,7 @@ def _bladder(decades: Decades) -> Apply:
 
     def apply(state: State, values: Values, setting: Setting) -> State:
         gain = 1.0 - values["creep_per_decade"] * decades(state, values, setting)
-        return replace(state, wall_gain=state.wall_gain * gain)
+        return state._replace(wall_gain=state.wall_gain * gain)
 
     return apply
 

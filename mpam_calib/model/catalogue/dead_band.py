@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mpam_calib.model.curves import middle_pressure, power
@@ -27,20 +25,20 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    return replace(state, pressure=np.maximum(state.pressure - values["P_DB_kPa"], 0.0))
+    return state._replace(pressure=np.maximum(state.pressure - values["P_DB_kPa"], 0.0))
 
 
 def _soft(state: State, values: Values, setting: Setting) -> State:
     """A gradual onset: the work lost grows to P_DB as the pressure passes it."""
     band = values["P_DB_kPa"]
     lost = band * -np.expm1(-state.pressure / np.maximum(np.abs(band), 1.0))
-    return replace(state, pressure=np.maximum(state.pressure - lost, 0.0))
+    return state._replace(pressure=np.maximum(state.pressure - lost, 0.0))
 
 
 def _power(state: State, values: Values, setting: Setting) -> State:
     """A power of the pressure, P_DB at the middle of the levels: below 0 it closes, 1 is a gauge's gain."""
     lost = values["P_DB_kPa"] * power(state.pressure / middle_pressure(setting), values["dead_band_exponent"])
-    return replace(state, pressure=np.maximum(state.pressure - lost, 0.0))
+    return state._replace(pressure=np.maximum(state.pressure - lost, 0.0))
 
 
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
@@ -51,7 +49,7 @@ def _closing(state: State, values: Values, setting: Setting) -> State:
     """The pressure that opens the bladder fades as higher pressures lay it against the braid."""
     past = (state.pressure - middle_pressure(setting)) / values["closing_kPa"]
     lost = values["P_DB_kPa"] * np.exp(np.clip(-past, -3.0, 3.0))
-    return replace(state, pressure=np.maximum(state.pressure - lost, 0.0))
+    return state._replace(pressure=np.maximum(state.pressure - lost, 0.0))
 
 
 def _over(setting: Setting) -> tuple[Parameter, ...]:

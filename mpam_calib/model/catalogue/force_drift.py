@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mpam_calib.model.bend import EARLY
@@ -21,25 +19,25 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    return replace(state, zero=state.zero + values["drift_N_per_min"] * state.readings.time)
+    return state._replace(zero=state.zero + values["drift_N_per_min"] * state.readings.time)
 
 
 def _settling(state: State, values: Values, setting: Setting) -> State:
     """Most of it early in the test, as a load cell warms up."""
     span = max(setting.duration, 1.0)
     path = span * np.log1p(EARLY * state.readings.time / span) / np.log1p(EARLY)
-    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+    return state._replace(zero=state.zero + values["drift_N_per_min"] * path)
 
 
 def _tared(state: State, values: Values, setting: Setting) -> State:
     """Anew in each file with a clock of its own: the cell was tared before."""
-    return replace(state, zero=state.zero + values["drift_N_per_min"] * state.readings.file_time)
+    return state._replace(zero=state.zero + values["drift_N_per_min"] * state.readings.file_time)
 
 
 def _early(state: State, values: Values, setting: Setting) -> State:
     """The same line from when the cell was tared: some of it is over when the first reading is taken."""
     path = state.readings.time + values["tared_before_s"]
-    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+    return state._replace(zero=state.zero + values["drift_N_per_min"] * path)
 
 
 def _before(setting: Setting) -> tuple[Parameter, ...]:
@@ -51,7 +49,7 @@ def _power(state: State, values: Values, setting: Setting) -> State:
     """A power of time, as far at half the test: 2 ever faster."""
     half = half_test(setting)
     path = half * signed_power(state.readings.time / half, values["drift_exponent"])
-    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+    return state._replace(zero=state.zero + values["drift_N_per_min"] * path)
 
 
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
@@ -62,14 +60,14 @@ def _root(state: State, values: Values, setting: Setting) -> State:
     """The square root of time, as far at half the test: heat that is conducted into the cell."""
     half = half_test(setting)
     path = np.sqrt(half * np.maximum(state.readings.time, 0.0))
-    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+    return state._replace(zero=state.zero + values["drift_N_per_min"] * path)
 
 
 def _thermal(state: State, values: Values, setting: Setting) -> State:
     """To a new balance of heat with one time constant, as far at half the test."""
     half = half_test(setting)
     path = half * settled(state.readings.time, values["warming_s"], half)
-    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+    return state._replace(zero=state.zero + values["drift_N_per_min"] * path)
 
 
 def _time(setting: Setting) -> tuple[Parameter, ...]:
@@ -81,14 +79,14 @@ def _return(state: State, values: Values, setting: Setting) -> State:
     """Out until half the test and back by its end: half a swing of the room's temperature."""
     half = half_test(setting)
     path = half * np.sin(0.5 * np.pi * state.readings.time / half)
-    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+    return state._replace(zero=state.zero + values["drift_N_per_min"] * path)
 
 
 def _swing(state: State, values: Values, setting: Setting) -> State:
     """With a period and a phase of its own, as large as the line at half the test."""
     turned = 2.0 * np.pi * state.readings.time / values["swing_s"] + values["swing_phase_deg"]
     path = half_test(setting) * np.sin(turned)
-    return replace(state, zero=state.zero + values["drift_N_per_min"] * path)
+    return state._replace(zero=state.zero + values["drift_N_per_min"] * path)
 
 
 def _period(setting: Setting) -> tuple[Parameter, ...]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
@@ -57,7 +55,7 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     gain: Array = 1.0 + values.get(LEVEL, np.zeros((1, 1)))
     for j in _degrees(setting):
         gain = gain + values[f"law_bend_{j}"] * legendre.legval(x, [0.0] * j + [1.0])
-    return replace(state, wall_gain=state.wall_gain * gain)
+    return state._replace(wall_gain=state.wall_gain * gain)
 
 
 def _exponential(state: State, values: Values, setting: Setting) -> State:
@@ -73,7 +71,7 @@ def _exponential(state: State, values: Values, setting: Setting) -> State:
         curve = curve + part * share * legendre.legval(x, [0.0] * j + [1.0])
         part = part * rate / (2 * j + 1)
     gain = 1.0 + values.get(LEVEL, np.zeros((1, 1))) + values[f"law_bend_{first}"] * curve
-    return replace(state, wall_gain=state.wall_gain * gain)
+    return state._replace(wall_gain=state.wall_gain * gain)
 
 
 def _curvature(setting: Setting) -> tuple[Parameter, ...]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mpam_calib.model.curves import half_test, middle_pressure, power, settled
@@ -19,20 +17,20 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    return replace(state, displacement=state.displacement + values["offset_mm"])
+    return state._replace(displacement=state.displacement + values["offset_mm"])
 
 
 def _scale(state: State, values: Values, setting: Setting) -> State:
     """The crosshead's scale is off: the error goes with the stroke, and is the offset at half of it."""
     part = state.displacement / (0.5 * setting.stroke)
-    return replace(state, displacement=state.displacement + values["offset_mm"] * part)
+    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
 
 
 def _line(state: State, values: Values, setting: Setting) -> State:
     """Zero and scale are both off: the error is a line in the stroke, and the offset at half of it."""
     share = values["scale_share"]
     part = 1.0 - share + share * state.displacement / (0.5 * setting.stroke)
-    return replace(state, displacement=state.displacement + values["offset_mm"] * part)
+    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
 
 
 def _scale_share(setting: Setting) -> tuple[Parameter, ...]:
@@ -42,7 +40,7 @@ def _scale_share(setting: Setting) -> tuple[Parameter, ...]:
 def _slip(state: State, values: Values, setting: Setting) -> State:
     """The grips slip early in the test, and then hold: the offset at half the test."""
     part = settled(state.readings.time, values["slip_s"], half_test(setting))
-    return replace(state, displacement=state.displacement + values["offset_mm"] * part)
+    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
 
 
 def _slip_time(setting: Setting) -> tuple[Parameter, ...]:
@@ -53,7 +51,7 @@ def _slip_time(setting: Setting) -> tuple[Parameter, ...]:
 def _seating(state: State, values: Values, setting: Setting) -> State:
     """The end fittings seat themselves under pressure: the offset is off by a power of it."""
     part = power(state.pressure / middle_pressure(setting), values["offset_exponent"])
-    return replace(state, displacement=state.displacement + values["offset_mm"] * part)
+    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
 
 
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
@@ -64,7 +62,7 @@ def _settling(state: State, values: Values, setting: Setting) -> State:
     """There from the start, and more or less of it at first."""
     fading = np.exp(-state.readings.time / values["slip_s"])
     part = 1.0 + values["offset_excess"] * fading
-    return replace(state, displacement=state.displacement + values["offset_mm"] * part)
+    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
 
 
 def _excess(setting: Setting) -> tuple[Parameter, ...]:
@@ -77,7 +75,7 @@ def _rezeroed(state: State, values: Values, setting: Setting) -> State:
     parts = [np.asarray(values[p.name]) for p in _parts(setting)]
     table = np.concatenate([*parts, sum(parts) / len(parts)], axis=-1)
     part = table[..., state.readings.level]
-    return replace(state, displacement=state.displacement + values["offset_mm"] * part)
+    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
 
 
 def _parts(setting: Setting) -> tuple[Parameter, ...]:

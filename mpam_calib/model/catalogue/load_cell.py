@@ -6,8 +6,6 @@ what it explains must not pass for the muscle's doing.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mpam_calib.model.effect import Effect, Stage, Values, register
@@ -34,14 +32,14 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
     beyond = np.clip((state.guide - values["cell_knee_N"]) / setting.force_scale, 0.0, MOST)
-    return replace(state, zero=state.zero - values["cell_loss_N"] * beyond ** values["cell_exponent"])
+    return state._replace(zero=state.zero - values["cell_loss_N"] * beyond ** values["cell_exponent"])
 
 
 def _zeroed(state: State, values: Values, setting: Setting) -> State:
     """The cell is zeroed anew at every level; between levels it is off as on average."""
     zeros = [np.asarray(values[p.name]) for p in _zeros(setting)]
     table = np.concatenate([*zeros, sum(zeros) / len(zeros)], axis=-1)
-    return replace(state, zero=state.zero + table[..., state.readings.level])
+    return state._replace(zero=state.zero + table[..., state.readings.level])
 
 
 def _zeros(setting: Setting) -> tuple[Parameter, ...]:
@@ -56,7 +54,7 @@ def _rescaled(state: State, values: Values, setting: Setting) -> State:
     """The cell's gain is another at every level (a loose plug, a range switched over)."""
     gains = [np.asarray(values[p.name]) for p in _gains(setting)]
     table = np.concatenate([*gains, sum(gains) / len(gains)], axis=-1)
-    return replace(state, gain=state.gain * (1.0 + table[..., state.readings.level]))
+    return state._replace(gain=state.gain * (1.0 + table[..., state.readings.level]))
 
 
 def _gains(setting: Setting) -> tuple[Parameter, ...]:

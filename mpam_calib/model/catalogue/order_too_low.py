@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +64,7 @@ def _with_the_law(state: State, setting: Setting, force: Array) -> State:
     """With a term that grows with the pressure, if the others do."""
     if setting.simulation.law != "constant":
         force = force * state.readings.pressure / setting.top_pressure
-    return replace(state, lost=state.lost - force)
+    return state._replace(lost=state.lost - force)
 
 
 def _fung(state: State, values: Values, setting: Setting) -> State:
@@ -133,7 +132,7 @@ def _steady(state: State, values: Values, setting: Setting) -> State:
     force = _term(state, values, setting)
     if setting.simulation.law != "constant":
         force = force * middle_pressure(setting) / setting.top_pressure
-    return replace(state, lost=state.lost - force)
+    return state._replace(lost=state.lost - force)
 
 
 def _line(state: State, values: Values, setting: Setting) -> State:
@@ -143,7 +142,7 @@ def _line(state: State, values: Values, setting: Setting) -> State:
         share = values["steady_share"]
         pressure = (1.0 - share) * state.readings.pressure + share * middle_pressure(setting)
         force = force * pressure / setting.top_pressure
-    return replace(state, lost=state.lost - force)
+    return state._replace(lost=state.lost - force)
 
 
 def _steady_share(setting: Setting) -> tuple[Parameter, ...]:

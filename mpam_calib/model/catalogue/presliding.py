@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.curves import STEEPEST
+from mpam_calib.model.distinct import over_distinct
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, Normal, Parameter
-from mpam_calib.model.readings import FAR
+from mpam_calib.model.readings import FAR, Readings
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
 Apply = Callable[[State, Values, Setting], State]
 
+OWN = ("reversal_mm", "dahl_exponent", "wen_exponent", "reversal_exponent")
+"""Parameters of its equations: the reversal, and the exponent that some of them have."""
 DAHL = ("dahl", "rest-dahl", "once-dahl", "masing-dahl", "sliding-dahl")
 WEN = ("wen", "rest-wen", "once-wen")
 
@@ -26,34 +28,33 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("reversal_mm", prior, "travel in which friction turns over after a reversal"),)
 
 
-def _exponential(state: State, values: Values) -> Array:
+def _exponential(travel: Array, reversal: Array, values: Values) -> Array:
     """What is left to turn over after some travel, from 1 to 0: Dahl's model."""
-    return np.exp(-state.readings.travel / values["reversal_mm"])
+    return np.exp(-travel / values["reversal_mm"])
 
 
-def _ramp(state: State, values: Values) -> Array:
+def _ramp(travel: Array, reversal: Array, values: Values) -> Array:
     """The same in proportion to the travel, to its end: elastic up to full sliding."""
-    return np.maximum(1.0 - state.readings.travel / values["reversal_mm"], 0.0)
+    return np.maximum(1.0 - travel / values["reversal_mm"], 0.0)
 
 
-def _dahl(state: State, values: Values) -> Array:
+def _dahl(travel: Array, reversal: Array, values: Values) -> Array:
     """Dahl's law with an exponent: 0 is the ramp, 1/2 Iwan's even slip, 1 the exponential, 2 a hyperbola."""
     beyond = values["dahl_exponent"] - 1.0
     beyond = np.where(np.abs(beyond) < SAME, SAME, beyond)
-    turn = state.readings.travel / values["reversal_mm"]
+    turn = travel / values["reversal_mm"]
     left = np.log1p(np.maximum(beyond * turn, NONE_LEFT - 1.0)) / beyond
     return np.asarray(np.exp(-np.minimum(left, 700.0)))
 
 
-def _bouc_wen(state: State, values: Values) -> Array:
+def _bouc_wen(travel: Array, reversal: Array, values: Values) -> Array:
     """Bouc and Wen's law: even up to no friction, then slower by its power n (n = 1 and 2: exactly)."""
-    return 0.5 * (1.0 - _built_up(state.readings.travel / values["reversal_mm"] - 1.0, values))
+    return 0.5 * (1.0 - _built_up(travel / values["reversal_mm"] - 1.0, values))
 
 
-def _bouc_wen_from_rest(state: State, values: Values) -> Array:
+def _bouc_wen_from_rest(travel: Array, reversal: Array, values: Values) -> Array:
     """The same, on a stroke that no reversal began from no friction on."""
-    readings = state.readings
-    return 0.5 * (1.0 - _built_up(readings.travel / values["reversal_mm"] - readings.reversal, values))
+    return 0.5 * (1.0 - _built_up(travel / values["reversal_mm"] - reversal, values))
 
 
 def _built_up(beyond: Array, values: Values) -> Array:
@@ -67,9 +68,9 @@ def _wen_exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("wen_exponent", LogNormal(1.5, 0.4), "how sudden full friction comes", "Wen 1976", ""),)
 
 
-def _power(state: State, values: Values) -> Array:
+def _power(travel: Array, reversal: Array, values: Values) -> Array:
     """A power of the travel up to full sliding: below 1 it rises steeply at once."""
-    turn = np.minimum(state.readings.travel / (WHOLE * values["reversal_mm"]), 1.0)
+    turn = np.minimum(travel / (WHOLE * values["reversal_mm"]), 1.0)
     return np.asarray(1.0 - turn ** np.minimum(values["reversal_exponent"], STEEPEST))
 
 
@@ -93,7 +94,7 @@ MASING = 2.0
 
 
 def _turning(
-    left: Callable[[State, Values], Array], first: float, quicker: float = 1.0, *, once: bool = False
+    left: Callable[[Array, Array, Values], Array], first: float, quicker: float = 1.0, *, once: bool = False
 ) -> Apply:
     """Friction that turns over, on a level's ``first`` stroke by so much and so much ``quicker``.
 
@@ -102,22 +103,27 @@ def _turning(
     turn 2/(1 + left(stroke)) over.
     """
 
-    def apply(state: State, values: Values, setting: Setting) -> State:
-        readings = state.readings
+    def turned(readings: Readings, values: Values) -> Array:
         later = readings.test_cycle > 1.0
         reversal = np.where(later, 1.0, readings.reversal) if once else readings.reversal
-
-        def left_after(travel: Array) -> Array:
-            moved = replace(readings, travel=travel, reversal=reversal)
-            return left(replace(state, readings=moved), values)
-
         one, two = readings.strokes_before.T
         second = (readings.cycle == 1.0) & (~later if once else True)
-        before = np.where(second, first, AGAINST / (1.0 + np.where(two < FAR, left_after(two), 0.0)))
-        missing = np.where(one < FAR, left_after(one) * before, 0.0)
+        left_after_two = np.where(two < FAR, left(two, reversal, values), 0.0)
+        before = np.where(second, first, AGAINST / (1.0 + left_after_two))
+        missing = np.where(one < FAR, left(one, reversal, values) * before, 0.0)
         swing = first + (AGAINST - missing - first) * reversal
         travel = readings.travel * (quicker + (1.0 - quicker) * reversal)
-        return replace(state, sign=state.sign * (1.0 - swing * left_after(travel)))
+        return np.asarray(1.0 - swing * left(travel, reversal, values))
+
+    def apply(state: State, values: Values, setting: Setting) -> State:
+        own = {name: values[name] for name in OWN if name in values}
+        if own["reversal_mm"].shape[1] > 1:  # it bends
+            return state._replace(sign=state.sign * turned(state.readings, own))
+
+        def of(sizes: Array) -> Array:
+            return turned(state.readings, dict(zip(own, np.hsplit(sizes, len(own)), strict=True)))
+
+        return state._replace(sign=state.sign * over_distinct(np.hstack(list(own.values())), of))
 
     return apply
 

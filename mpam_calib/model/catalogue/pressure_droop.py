@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,7 +30,7 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 def _drooped(state: State, values: Values, part: Array) -> State:
     """With this part (B or 1, n) of the droop at full stroke."""
-    return replace(state, pressure=state.pressure * (1.0 - values["droop_percent"] * part))
+    return state._replace(pressure=state.pressure * (1.0 - values["droop_percent"] * part))
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
@@ -137,7 +135,7 @@ def _reservoir(state: State, values: Values, setting: Setting) -> State:
     lost = np.minimum(values["droop_percent"] * middle / (middle + ATMOSPHERE), MOST_LOST)
     filled = _filled(np.maximum(state.displacement, 0.0), state, setting)
     expanded = 1.0 + lost / (1.0 - lost) * filled
-    return replace(state, pressure=(state.pressure + ATMOSPHERE) / expanded - ATMOSPHERE)
+    return state._replace(pressure=(state.pressure + ATMOSPHERE) / expanded - ATMOSPHERE)
 
 
 def _filled(place: Array, state: State, setting: Setting) -> Array:

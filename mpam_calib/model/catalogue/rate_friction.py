@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,7 +33,7 @@ def _stroke(state: State, values: Values, setting: Setting) -> State:
 
 def _gained(state: State, values: Values, decades: Array) -> State:
     gain = np.maximum(1.0 + values["rate_per_decade"] * decades, 0.0)
-    return replace(state, friction_gain=state.friction_gain * gain)
+    return state._replace(friction_gain=state.friction_gain * gain)
 
 
 def _viscous(state: State, values: Values, setting: Setting) -> State:
@@ -48,7 +46,7 @@ def _viscous(state: State, values: Values, setting: Setting) -> State:
 
 def _dragged(state: State, values: Values, setting: Setting, growth: Array) -> State:
     added = values["rate_per_decade"] * _at_scale(state, setting) * growth / np.log(10.0)
-    return replace(state, drag=state.drag + added)
+    return state._replace(drag=state.drag + added)
 
 
 def _at_scale(state: State, setting: Setting) -> Array:

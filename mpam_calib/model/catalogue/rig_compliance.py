@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mpam_calib.model.curves import settled
@@ -19,7 +17,7 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    return replace(state, displacement=state.displacement + values["compliance_mm_per_N"] * state.guide)
+    return state._replace(displacement=state.displacement + values["compliance_mm_per_N"] * state.guide)
 
 
 NEAR = 0.05
@@ -31,7 +29,7 @@ def _power(state: State, values: Values, setting: Setting) -> State:
     load = state.guide / setting.force_scale
     size = (load**2 + NEAR**2) / (1.0 + NEAR**2)
     part = state.guide * np.clip(size, None, 2500.0) ** (0.5 * (values["compliance_exponent"] - 1.0))
-    return replace(state, displacement=state.displacement + values["compliance_mm_per_N"] * part)
+    return state._replace(displacement=state.displacement + values["compliance_mm_per_N"] * part)
 
 
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
@@ -42,7 +40,7 @@ def _toe(state: State, values: Values, setting: Setting) -> State:
     """Soft until its slack is taken up, then stiff; it gives as much at the force scale."""
     part = np.sign(state.guide) * settled(np.abs(state.guide), values["toe_N"], setting.force_scale)
     give = values["compliance_mm_per_N"] * setting.force_scale * part
-    return replace(state, displacement=state.displacement + give)
+    return state._replace(displacement=state.displacement + give)
 
 
 def _toe_force(setting: Setting) -> tuple[Parameter, ...]:
@@ -56,7 +54,7 @@ def _preload(state: State, values: Values, setting: Setting) -> State:
     stretch = scale / np.maximum(scale - preload, CLOSED * scale)
     beyond = np.sign(state.guide) * np.maximum(np.abs(state.guide) - preload, 0.0)
     give = values["compliance_mm_per_N"] * stretch * beyond
-    return replace(state, displacement=state.displacement + give)
+    return state._replace(displacement=state.displacement + give)
 
 
 CLOSED = 0.2

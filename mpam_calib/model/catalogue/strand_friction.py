@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,7 +52,7 @@ def _pressed(state: State, values: Values, setting: Setting) -> Array:
 
 def _rubbing(state: State, values: Values, part: Array) -> State:
     """With so much (B or 1, n) of Eq. 2.43."""
-    return replace(state, strand=state.strand + values["f_s"] * part)
+    return state._replace(strand=state.strand + values["f_s"] * part)
 
 
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,7 +109,7 @@ def _level_way(state: State, setting: Setting) -> Array:
 def _bladder(share: Share) -> Apply:
     def apply(state: State, values: Values, setting: Setting) -> State:
         gain = 1.0 + values["first_cycle_fraction"] * share(state, values, setting)
-        return replace(state, wall_gain=state.wall_gain * gain)
+        return state._replace(wall_gain=state.wall_gain * gain)
 
     return apply
 
@@ -120,7 +119,7 @@ def _muscle(share: Share) -> Apply:
 
     def apply(state: State, values: Values, setting: Setting) -> State:
         gain = 1.0 + values["first_cycle_fraction"] * share(state, values, setting)
-        return replace(state, gain=state.gain * gain)
+        return state._replace(gain=state.gain * gain)
 
     return apply
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mpam_calib.model.curves import middle_shape, signed_power
@@ -34,13 +32,13 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
     R = SHAPES[state.kinematics](state.length, state.rest).R
-    return replace(state, length=tip_shortened_length(state.length, R, state.rest, values["tip_factor"]))
+    return state._replace(length=tip_shortened_length(state.length, R, state.rest, values["tip_factor"]))
 
 
 def _working(state: State, values: Values, setting: Setting) -> State:
     """The radius that rounds the tips is that of the working length itself."""
     length = tip_shortened_length_of_its_own(state.length, state.kinematics, state.rest, values["tip_factor"])
-    return replace(state, length=length)
+    return state._replace(length=length)
 
 
 def _power(state: State, values: Values, setting: Setting) -> State:
@@ -48,7 +46,7 @@ def _power(state: State, values: Values, setting: Setting) -> State:
     middle = np.maximum(middle_shape(state, setting).R - state.rest.R0, 1e-3 * state.rest.R0)
     growth = (SHAPES[state.kinematics](state.length, state.rest).R - state.rest.R0) / middle
     R = state.rest.R0 + middle * signed_power(growth, values["tip_exponent"])
-    return replace(state, length=tip_shortened_length(state.length, R, state.rest, values["tip_factor"]))
+    return state._replace(length=tip_shortened_length(state.length, R, state.rest, values["tip_factor"]))
 
 
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
@@ -60,21 +58,21 @@ def _round(state: State, values: Values, setting: Setting) -> State:
     middle = middle_shape(state, setting).R
     share = (middle - state.rest.R0) / middle
     R = state.rest.R0 + share * SHAPES[state.kinematics](state.length, state.rest).R
-    return replace(state, length=tip_shortened_length(state.length, R, state.rest, values["tip_factor"]))
+    return state._replace(length=tip_shortened_length(state.length, R, state.rest, values["tip_factor"]))
 
 
 def _tapered(state: State, values: Values, setting: Setting) -> State:
     """The ends take the same share of every contraction: Eq. 2.47's length at half of the stroke."""
     half = 0.5 * setting.stroke
     lost = 2.0 * (np.pi / 2.0 - 1.0) * (middle_shape(state, setting).R - state.rest.R0) / half
-    return replace(state, length=state.length - values["tip_factor"] * lost * (state.rest.L0 - state.length))
+    return state._replace(length=state.length - values["tip_factor"] * lost * (state.rest.L0 - state.length))
 
 
 def _volume(state: State, values: Values, setting: Setting) -> State:
     """The muscle keeps its length, and the gas does no work on what its ends lack of the cylinder."""
     shape = SHAPES[state.kinematics](np.maximum(state.length, SHORTEST * state.rest.L0), state.rest)
     loss = work_lost_at_tips(state.pressure, shape, state.rest)
-    return replace(state, lost=state.lost + values["tip_factor"] * loss)
+    return state._replace(lost=state.lost + values["tip_factor"] * loss)
 
 
 register(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from mpam_calib.model.curves import middle_pressure, middle_shape, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, Normal, Parameter
@@ -19,7 +17,7 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    return replace(state, wall_factor=state.wall_factor * (1.0 - values["wall_factor"]))
+    return state._replace(wall_factor=state.wall_factor * (1.0 - values["wall_factor"]))
 
 
 def _thick(state: State, values: Values, setting: Setting) -> State:
