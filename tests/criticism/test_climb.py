@@ -1,4 +1,7 @@
-"""The climb's slopes: sizes that act at one level each are moved together, and come out as if one by one."""
+"""The climb's slopes: sizes that act at one level each are moved together, and come out as if one by one.
+
+And its steps, with and without coordinates that are stuck.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import numpy as np
 import pytest
 
 from mpam_calib.criticism.candidates import candidates
-from mpam_calib.criticism.climb import Climb
+from mpam_calib.criticism.climb import Climb, _damped
 from mpam_calib.criticism.fit import chain_for
 from mpam_calib.criticism.forms import forms_of
 from mpam_calib.criticism.problem import Problem
@@ -48,3 +51,18 @@ def test_readings_between_the_levels_feel_the_friction_of_two(problem: Problem) 
     between = replace(problem, readings=replace(readings, level=np.full_like(readings.level, -1)))
     climb = climb_of(between, "creep")
     assert len(climb._offsets) == 1 + len(climb.names)
+
+
+@pytest.mark.parametrize("stuck", [[], [1], [0, 2]])
+def test_a_stuck_coordinate_takes_no_step_and_the_others_the_best_without_it(stuck: list[int]) -> None:
+    rng = np.random.default_rng(8)
+    root, gradient = rng.standard_normal((9, 5)), rng.standard_normal(5)
+    hessian = root.T @ root + np.eye(5)
+    before = hessian.copy(), gradient.copy()
+    step = _damped(hessian, gradient, 0.3, np.isin(np.arange(3), stuck))
+    free = np.setdiff1d(np.arange(5), stuck)
+    damped = hessian + 0.3 * np.diag(np.diagonal(hessian))
+    np.testing.assert_allclose(step[free], np.linalg.solve(damped[np.ix_(free, free)], gradient[free]))
+    assert np.all(step[stuck] == 0.0)
+    np.testing.assert_array_equal(hessian, before[0])
+    np.testing.assert_array_equal(gradient, before[1])
