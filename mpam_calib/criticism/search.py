@@ -21,8 +21,8 @@ LEADING_SHARE = 3
 """One in so many of the sets that are extended is extended by every effect."""
 PARTNERS = 8
 """Best single effects that are tried as partners of every kept set."""
-SCREENED = 20
-"""Further sets of three, of those that straight lines along the pairs promise most of."""
+SCREENED, BENT = 80, 20
+"""Further sets of three that straight lines along the pairs promise most of, and how many of them are bent."""
 MUCH_LESS = 0.8
 """Scale of the noise down to which forms that were tried before, and stayed, need not be tried again."""
 DOUBTED = 4
@@ -95,7 +95,7 @@ def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
             screened = promising(found.problem, found.fits, tested, k - 1)
             new = [s for s in screened if (s, 0) not in found.fits][:SCREENED]
             found.refit_all((effects, 0) for effects in new)
-            found.bend_all((effects, 0) for effects in new)
+            found.bend_all((effects, 0) for effects in found.best_bare(new)[:BENT])
         tell(0.4 if k == 2 else 0.75)
         kept = found.kept(k, width)
         for size in every:

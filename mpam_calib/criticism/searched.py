@@ -268,9 +268,12 @@ class Search:
         """The best sets with this many effects: by posterior, and by fit alone without a remainder."""
         sets = {effects for effects, _ in self.fits if len(effects) == count}
         by_score = best_first(sets, self.score)[:width]
+        return list(dict.fromkeys([*by_score, *self.best_bare(sets)[: max(width // 2, 1)]]))
+
+    def best_bare(self, sets: Iterable[Set]) -> list[Set]:
+        """Those of these sets that were refitted without a remainder, by that fit alone, best first."""
         bare = {s for s in sets if (s, 0) in self.fits}
-        by_fit = best_first(bare, lambda s: self.fits[s, 0].log_evidence)[: max(width // 2, 1)]
-        return list(dict.fromkeys([*by_score, *by_fit]))
+        return best_first(bare, lambda s: self.fits[s, 0].log_evidence)
 
     @property
     def sets(self) -> list[Set]:
