@@ -22,7 +22,7 @@ LEADING_SHARE = 3
 PARTNERS = 8
 """Best single effects that are tried as partners of every kept set."""
 SCREENED, BENT = 80, 20
-"""Further sets of three that straight lines along the pairs promise most of, and how many of them are bent."""
+"""Further sets of three that straight lines along the pairs promise most of; so many of them are bent."""
 MUCH_LESS = 0.8
 """Scale of the noise down to which forms that were tried before, and stayed, need not be tried again."""
 DOUBTED = 4
@@ -92,10 +92,7 @@ def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
             found.refit_all((effects, size) for effects in sorted(tries, key=sorted))
         if k == LARGEST and width >= WIDTH:
             # A kept set may hold a stand-in for two causes, whose own pairs all trail behind it.
-            screened = promising(found.problem, found.fits, tested, k - 1)
-            new = [s for s in screened if (s, 0) not in found.fits][:SCREENED]
-            found.refit_all((effects, 0) for effects in new)
-            found.bend_all((effects, 0) for effects in found.best_bare(new)[:BENT])
+            _screen(found, k)
         tell(0.4 if k == 2 else 0.75)
         kept = found.kept(k, width)
         for size in every:
@@ -103,6 +100,14 @@ def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
         if k < LARGEST:
             found.polish(kept)
     found.polish_near()
+
+
+def _screen(found: Search, count: int) -> None:
+    """Sets of so many effects that lines along smaller ones promise most of, wherever these were ranked."""
+    promised = promising(found.problem, found.fits, found.tested, count - 1)
+    new = [s for s in promised if (s, 0) not in found.fits][:SCREENED]
+    found.refit_all((effects, 0) for effects in new)
+    found.bend_all((effects, 0) for effects in found.best_bare(new)[:BENT])
 
 
 def _finish(found: Search, width: int, tell: Callable[[float], None]) -> None:

@@ -13,6 +13,7 @@ from rig.effects import shared_form
 from rig.recipes import Recipe, Wanted, build_case
 
 from criticism.test_hypotheses import problem_of, specimen_of
+from mpam_calib.criticism import search as procedure
 from mpam_calib.criticism.climb import Climb, Place
 from mpam_calib.criticism.fit import chain_for, doubt_on_rows, fit
 from mpam_calib.criticism.forms import flexible, forms_of, price
@@ -178,6 +179,25 @@ def test_a_climb_is_given_up_only_without_hope(monkeypatch: pytest.MonkeyPatch) 
     # What comes near, or is better, is climbed as if there were no rival.
     assert climbed(poor, bad.objective + 20.0) == whole
     assert climbed(hidden, bad.objective)[0] == good.log_evidence
+
+
+def test_of_the_screened_sets_those_are_bent_that_came_closest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines promise, refits decide: an order of promises that is turned round changes nothing."""
+    problem = problem_of(specimen_of("develop-null-001"))
+    tested = ("force_drift", "length_offset", "pressure_droop", "tip_shape")
+    found = Search(problem, tested, Alone(problem))
+    found.refit_all((frozenset(s), 0) for k in range(3) for s in combinations(tested, k))
+    known = frozenset(tested[:3])
+    found.refit(known, 0)
+    bent: list[frozenset[str]] = []
+    promised = procedure.promising
+    monkeypatch.setattr(procedure, "promising", lambda *known: promised(*known)[::-1])
+    monkeypatch.setattr(procedure, "BENT", 2)
+    monkeypatch.setattr(Search, "bend_all", lambda found, keys: bent.extend(s for s, _ in keys))
+    procedure._screen(found, 3)
+    triples = set(map(frozenset, combinations(tested, 3)))
+    assert triples == {s for s, _ in found.fits if len(s) == 3}
+    assert bent == sorted(triples - {known}, key=lambda s: -found.fits[s, 0].log_evidence)[:2]
 
 
 def undoubted(found: Search) -> Search:
