@@ -19,6 +19,7 @@ from mpam_calib.criticism.budget import beyond_noise
 from mpam_calib.criticism.candidates import HISTORY
 from mpam_calib.criticism.climb import STEP
 from mpam_calib.criticism.fit import Fit, chain_for, doubt_about
+from mpam_calib.criticism.folds import FEWEST, folds_of, log_densities, total
 from mpam_calib.criticism.journal import Journal
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.refits import Set, causes_of
@@ -28,9 +29,6 @@ from mpam_calib.model.blueprint import Blueprint
 
 Array = NDArray[np.float64]
 
-FOLDS = 5
-FEWEST = 3
-"""Levels or cycles of which one can be left out."""
 FOLD_WIDTH = 3
 Z90 = 1.6449
 
@@ -59,11 +57,14 @@ class Gain:
 
 @dataclass(frozen=True)
 class _Fold:
-    """Residuals (N), whether each lies in its band, and log density: before, chosen by the fold, named."""
+    """Residuals (N), whether each lies in its band, log densities by what is left out (3, labels).
+
+    Before, with what the fold chose, with the causes named.
+    """
 
     residuals: list[Array]
     inside: list[NDArray[np.bool_]]
-    elpd: list[float]
+    elpd: Array
     chosen: Set
 
 
@@ -85,10 +86,9 @@ def measure_gain(
     groups, labels = (problem.cycle, cycles) if by_cycle else (problem.level, levels)
     if len(labels) < FEWEST:
         return None
-    parts = [labels[i::FOLDS] for i in range(min(FOLDS, len(labels)))]
-    folds = []
+    parts, folds = folds_of(labels), []
     for part in parts:
-        folds.append(_fold(problem, tested, named, np.isin(groups, part), workers, journal))
+        folds.append(_fold(problem, tested, named, groups, part, workers, journal))
         if tell is not None:
             tell(len(folds) / len(parts))
     errors = [
@@ -96,9 +96,8 @@ def measure_gain(
         for r in zip(*(f.residuals for f in folds), strict=True)
     ]
     covered = [float(np.mean(np.concatenate(i))) for i in zip(*(f.inside for f in folds), strict=True)]
-    (gained, gained_se), (named_gained, named_se) = (
-        _total([f.elpd[which] - f.elpd[0] for f in folds]) for which in (1, 2)
-    )
+    before, *after = np.concatenate([f.elpd for f in folds], axis=1)
+    (gained, gained_se), (named_gained, named_se) = (total(elpd - before) for elpd in after)
     return Gain(
         held_out="cycle" if by_cycle else "pressure",
         rmse_before=errors[0],
@@ -116,19 +115,16 @@ def measure_gain(
     )
 
 
-def _total(gains: list[float]) -> tuple[float, float]:
-    """Sum of what the folds gain, and its standard error."""
-    return float(np.sum(gains)), float(np.sqrt(len(gains)) * np.std(gains, ddof=1))
-
-
 def _fold(
     problem: Problem,
     tested: tuple[str, ...],
     named: Fit,
-    held: NDArray[np.bool_],
+    groups: NDArray[np.int64],
+    part: NDArray[np.int64],
     workers: int,
     journal: Journal | None,
 ) -> _Fold:
+    held = np.isin(groups, part)
     # Workers share one fold's search: three folds on two workers would leave one idle.
     found = search(
         problem.take(~held), tested, width=FOLD_WIDTH, workers=workers, settle=False, journal=journal
@@ -149,17 +145,11 @@ def _fold(
         inside=[
             np.abs(r) <= Z90 * np.sqrt(np.diagonal(c)) for r, c in zip(residuals, covariances, strict=True)
         ],
-        elpd=[log_density(r, c) for r, c in zip(residuals, covariances, strict=True)],
+        elpd=np.array(
+            [log_densities(r, c, groups[held]) for r, c in zip(residuals, covariances, strict=True)]
+        ),
         chosen=chosen,
     )
-
-
-def log_density(residual: Array, covariance: Array) -> float:
-    """Log density of a residual (n,) under N(0, covariance)."""
-    factor = linalg.cho_factor(covariance, lower=True)
-    log_det = 2.0 * float(np.sum(np.log(np.diagonal(factor[0]))))
-    square = float(residual @ linalg.cho_solve(factor, residual))
-    return -0.5 * (square + log_det + len(residual) * float(np.log(2.0 * np.pi)))
 
 
 def predict_rows(

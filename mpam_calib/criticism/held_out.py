@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.gain import FEWEST, FOLDS, Z90, log_density, predict_rows
+from mpam_calib.criticism.folds import FEWEST, folds_of, log_densities, total
+from mpam_calib.criticism.gain import Z90, predict_rows
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.ranking import Ranked, blueprint_of
 from mpam_calib.criticism.spread import held_problem
@@ -21,7 +20,7 @@ LEVEL_COLUMNS = ["pressure_kPa", "rows", "rmse_N", "bias_N", "bias_sd_N", "insid
 
 
 def hold_out(ranked: Ranked) -> tuple[float, float, float]:
-    """RMSE (N), joint log predictive density and its standard error over folds of whole levels.
+    """RMSE (N), joint log predictive density and its standard error, whole levels left out in folds.
 
     NaN where there are too few levels, or a fold cannot be fitted.
     """
@@ -31,15 +30,15 @@ def hold_out(ranked: Ranked) -> tuple[float, float, float]:
     if len(labels) < FEWEST:
         return blank
     squares, densities = [], []
-    for i in range(min(FOLDS, len(labels))):
+    for part in folds_of(labels):
         try:
-            residual, covariance = _left_out(problem, ranked, labels[i::FOLDS])
-            densities.append(log_density(residual, covariance))
+            residual, covariance = _left_out(problem, ranked, part)
+            level = problem.level[np.isin(problem.level, part)]
+            densities.append(log_densities(residual, covariance, level))
         except np.linalg.LinAlgError:
             return blank
         squares.append(residual**2)
-    error = float(np.sqrt(len(densities)) * np.std(densities, ddof=1))
-    return float(np.sqrt(np.mean(np.concatenate(squares)))), float(np.sum(densities)), error
+    return float(np.sqrt(np.mean(np.concatenate(squares)))), *total(np.concatenate(densities))
 
 
 def hold_out_each(ranked: Ranked) -> pd.DataFrame:
@@ -69,9 +68,7 @@ def hold_out_each(ranked: Ranked) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=LEVEL_COLUMNS)
 
 
-def _left_out(
-    problem: Problem, ranked: Ranked, levels: Sequence[int] | NDArray[np.int64]
-) -> tuple[Array, Array]:
+def _left_out(problem: Problem, ranked: Ranked, levels: NDArray[np.int64]) -> tuple[Array, Array]:
     """Residual (h,) and predictive covariance (h, h) of these levels' rows, fitted to all others.
 
     The remainder has the size that suits the model best on all rows.

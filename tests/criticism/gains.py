@@ -22,7 +22,8 @@ from rig import recipes, sets
 from rig.oracle import Oracle
 
 from mpam_calib.criticism.candidates import HISTORY, candidates
-from mpam_calib.criticism.gain import FOLDS, measure_gain
+from mpam_calib.criticism.folds import folds_of
+from mpam_calib.criticism.gain import measure_gain
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.search import search
 from mpam_calib.criticism.verdict import judge
@@ -48,15 +49,14 @@ def oracle_rmse(recording: rig_case.Recording, specimen: Specimen, problem: Prob
     loops = specimen.loops
     assert loops is not None
     raw, reduced = (loops.cycle, problem.cycle) if by_cycle else (loops.level, problem.level)
-    labels = np.unique(reduced)
     known = {h.id: h.size for h in recording.case.hidden}
     squares = []
-    for i in range(min(FOLDS, len(labels))):
-        held = np.isin(raw, labels[i::FOLDS])
+    for part in folds_of(np.unique(reduced)):
+        held = np.isin(raw, part)
         fitted = Oracle(recording, ~held).fit(recording.case.ids, known)
         # The same reduction of the oracle's force as of the readings.
         force = problem_of(replace(specimen, loops=replace(loops, force_N=fitted.force))).force
-        squares.append((force - problem.force)[np.isin(reduced, labels[i::FOLDS])] ** 2)
+        squares.append((force - problem.force)[np.isin(reduced, part)] ** 2)
     return float(np.sqrt(np.mean(np.concatenate(squares))))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rig import sets
+from scipy import stats
 
 from criticism.order_four import draw_case
 from criticism.own_rates import made_with_rates_of_its_own
@@ -51,12 +52,12 @@ def test_held_out_levels_are_predicted_from_the_others() -> None:
     problem = problem_of(specimen_of(recipe.name))
     held = problem.level == problem.level.max()
     index = (np.flatnonzero(~held), np.flatnonzero(held))
-    from mpam_calib.criticism.gain import log_density, predict_rows
+    from mpam_calib.criticism.gain import predict_rows
 
     fitted = fit(problem.take(~held), frozenset(), 0)
     mean, covariance = predict_rows(problem, fitted, index)
-    right = log_density(problem.force[held] - mean, covariance)
-    wrong = log_density(1.1 * problem.force[held] - mean, covariance)
+    known = stats.multivariate_normal(mean, covariance)
+    right, wrong = (known.logpdf(factor * problem.force[held]) for factor in (1.0, 1.1))
     assert right > wrong + 10.0
 
 
