@@ -114,6 +114,7 @@ def _mode(seen: list[Windows], averaged: int, model: Model) -> NoiseLevel:
     priors: dict[str, Prior] = {p.name: p.prior for p in model.parameters}
     scale = 1.0 if model.setting is None else model.setting.force_scale
 
+    typical = float(priors[WHITE].from_normal(np.zeros(1))[0]) if WHITE in priors else 0.0
     readings = [0.0]
     if isinstance(lasts := priors.get(TIME), LogUniform):
         priors[TIME] = replace(lasts, low=BRIEF * lasts.low)
@@ -123,6 +124,9 @@ def _mode(seen: list[Windows], averaged: int, model: Model) -> NoiseLevel:
 
     def level(u: Array, reading: float) -> NoiseLevel:
         given = {name: float(priors[name].from_normal(u[i : i + 1])[0]) for i, name in enumerate(names)}
+        if typical and CORRELATED in given:
+            # A noisy cell is noisy at all its frequencies: few windows tell a share better than a size.
+            given[CORRELATED] *= given[WHITE] / typical
         told = NoiseLevel(*(given.get(name, absent) for name, absent in ABSENT.items()))
         return replace(told, reading=reading)
 

@@ -29,13 +29,13 @@ EFFECT_IDS: Final[tuple[str, ...]] = (
 
 EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(EFFECT_IDS, ("bent",)),
-    "dead_band": ("bent", "soft", "power", "closing"),
-    "tip_shape": ("bent", "working", "power", "round", "tapered", "volume"),
+    "dead_band": ("bent", "soft", "power", "closing", "balloon"),
+    "tip_shape": ("bent", "working", "power", "round", "tapered", "easing", "volume"),
     "braid_kinematics": ("bent", "swell", "thickness", "thin", "section"),
     "braid_angle": ("bent", "seating"),
     "braid_stretch": ("bent", "longer-bent", "power", "longer", "both"),
     "wall_pressure": ("bent", "thick", "pressed"),
-    "length_offset": ("bent", "scale", "line", "slip", "settling", "seating", "rezeroed"),
+    "length_offset": ("bent", "scale", "line", "slip", "settling", "bedding", "seating", "rezeroed"),
     "strand_friction": ("bent", "power", "even", "contact", "tension"),
     "coulomb_friction": ("bent", "constant", "capstan", "power"),
     "rate_friction": (
@@ -52,10 +52,11 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
         *("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),
         *("power", "force-power", "test-power", "test-force-power"),
         *("virgin", "virgin-fading", "force-fading", "fresh", "path", "test-virgin", "test-force-virgin"),
+        *("recovering", "force-recovering"),
     ),
     "creep": (
-        *("bent", "wall", "wall-bent", "early", "power", "solid"),
-        *("wall-early", "wall-power", "wall-solid"),
+        *("bent", "wall", "wall-bent", "early", "power", "solid", "stretched"),
+        *("wall-early", "wall-power", "wall-solid", "wall-stretched"),
     ),
     "force_drift": (
         *("bent", "settling", "settling-bent", "tared", "tared-bent"),

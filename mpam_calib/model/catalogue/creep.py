@@ -73,6 +73,20 @@ def _solid(state: State, values: Values, setting: Setting) -> Array:
     return np.asarray(np.log10(1.0 + _middle(setting) / ONSET) * part)
 
 
+def _stretched(state: State, values: Values, setting: Setting) -> Array:
+    """Decades along an exponential of a power of time: relaxations with many time constants."""
+    power = np.minimum(values["creep_stretch"], 3.0)
+    part, middle = (
+        -np.expm1(-((time / values["relaxation_s"]) ** power))
+        for time in (state.readings.time_at_level, _middle(setting))
+    )
+    return np.asarray(np.log10(1.0 + _middle(setting) / ONSET) * part / middle)
+
+
+def _stretch(setting: Setting) -> Parameter:
+    return Parameter("creep_stretch", LogNormal(0.6, 0.4), "power of the time in the exponential", "", "")
+
+
 def _time(setting: Setting) -> Parameter:
     return Parameter("relaxation_s", LogNormal(0.4 * _middle(setting), 1.0), "time of relaxation")
 
@@ -97,16 +111,18 @@ def _bladder(decades: Decades) -> Apply:
     return apply
 
 
-DECADES = {"early": _early, "power": _power, "solid": _solid}
+DECADES = {"early": _early, "power": _power, "solid": _solid, "stretched": _stretched}
 OWN: dict[str, Parameters] = {
     "early": lambda setting: (_before(setting),),
     "power": lambda setting: (_exponent(setting), _before(setting)),
     "solid": lambda setting: (_time(setting), _before(setting)),
+    "stretched": lambda setting: (_time(setting), _stretch(setting)),
 }
 SOURCES = {
     "early": "the same logarithm, counted from before the first reading",
     "power": "power law of relaxation (Nutting 1921; Findley 1944)",
     "solid": "standard linear solid (Zener 1948): 1 − exp(−t/τ)",
+    "stretched": "stretched exponential, 1 − exp(−(t/τ)^β) (Kohlrausch 1854; Williams & Watts 1970)",
 }
 """Equations for the relaxation, of the whole force or of the bladder alone."""
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mpam_calib.model.curves import middle_pressure, power
+from mpam_calib.model.curves import middle_pressure, middle_shape, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, Normal, NormalWithin, Parameter
 from mpam_calib.model.state import Setting, State
+from mpam_calib.physics.kinematics import SHAPES, SHORTEST
+
+Array = NDArray[np.float64]
 
 OWN_SD = 0.1
 """Prior sd of a dead-band as a share of the top level."""
@@ -57,6 +61,25 @@ def _over(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("closing_kPa", prior, "pressure over which the dead-band closes"),)
 
 
+def _balloon(state: State, values: Values, setting: Setting) -> State:
+    """A bladder blown up to the braid takes the more the wider that is: P_DB at half the stroke."""
+    length = np.maximum(state.rest.L0 - state.displacement, SHORTEST * state.rest.L0)
+    part = _inflated(SHAPES[state.kinematics](length, state.rest).R, state, values)
+    lost = values["P_DB_kPa"] * part / _inflated(middle_shape(state, setting).R, state, values)
+    return state._replace(pressure=np.maximum(state.pressure - lost, 0.0))
+
+
+def _inflated(R: Array, state: State, values: Values) -> Array:
+    """1 − λ⁻⁴: the pressure in a thin tube of a neo-Hookean rubber at R = λr, over that at any width."""
+    free = state.rest.R0 / (1.0 + np.minimum(values["bladder_gap"], 1.0))
+    return np.asarray(-np.expm1(-4.0 * np.log(np.maximum(R / free, 1.0))))
+
+
+def _gap(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LogNormal(0.15, 0.7)
+    return (Parameter("bladder_gap", prior, "how much wider the braid is than the bladder", "", ""),)
+
+
 register(
     Effect(
         id="dead_band",
@@ -68,11 +91,12 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"soft": _soft, "power": _power, "closing": _closing},
-        own={"power": _exponent, "closing": _over},
+        forms={"soft": _soft, "power": _power, "closing": _closing, "balloon": _balloon},
+        own={"power": _exponent, "closing": _over, "balloon": _gap},
         sources={
             "power": "textbook: P_DB·(P/P_middle)^m (0: an offset, 1: an error of the gauge's gain)",
             "closing": "elastic threshold of the bladder (cf. Tsagarakis & Caldwell 2000), fading with P",
+            "balloon": "inflation of a thin neo-Hookean tube to the braid, ∝ 1 − λ⁻⁴ (Treloar 1975)",
         },
         bends={"pressure": 3},
     )

@@ -65,9 +65,24 @@ def _settling(state: State, values: Values, setting: Setting) -> State:
     return state._replace(displacement=state.displacement + values["offset_mm"] * part)
 
 
+def _bedding(state: State, values: Values, setting: Setting) -> State:
+    """The same, from cycle to cycle: the grips bed in as they are loaded."""
+    fading = np.exp((1.0 - state.readings.test_cycle) / values["bedding_cycles"])
+    part = 1.0 + values["offset_excess"] * fading
+    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
+
+
+def _bedding_in(setting: Setting) -> tuple[Parameter, ...]:
+    cycles = Parameter("bedding_cycles", LogNormal(2.0, 0.7), "cycles in which the grips bed in", "", "")
+    return _more_at_first(), cycles
+
+
 def _excess(setting: Setting) -> tuple[Parameter, ...]:
-    excess = Parameter("offset_excess", Normal(0.0, 0.7), "what is more of it at first, as a share", "", "")
-    return (excess, *_slip_time(setting))
+    return (_more_at_first(), *_slip_time(setting))
+
+
+def _more_at_first() -> Parameter:
+    return Parameter("offset_excess", Normal(0.0, 0.7), "what is more of it at first, as a share", "", "")
 
 
 def _rezeroed(state: State, values: Values, setting: Setting) -> State:
@@ -102,6 +117,7 @@ register(
             "line": _line,
             "slip": _slip,
             "settling": _settling,
+            "bedding": _bedding,
             "seating": _seating,
             "rezeroed": _rezeroed,
         },
@@ -109,16 +125,18 @@ register(
             "line": _scale_share,
             "slip": _slip_time,
             "settling": _excess,
+            "bedding": _bedding_in,
             "seating": _exponent,
             "rezeroed": _parts,
         },
-        recalls=("slip", "settling"),
+        recalls=("slip", "settling", "bedding"),
         apart=("rezeroed",),
         sources={
             "scale": "textbook: gain error of a displacement sensor",
             "line": "textbook: a displacement sensor's calibration line, wrong in zero and gain",
             "slip": "textbook: first-order settling of a clamp, 1 − exp(−t/τ)",
             "settling": "textbook: an offset with an exponential transient, 1 + c·exp(−t/τ)",
+            "bedding": "textbook: the same by the count of load cycles (preconditioning of grips)",
             "seating": "textbook: end fittings that seat under pressure, δ·(P/P_middle)^m",
             "rezeroed": "textbook: repeatability of a zero, an error of its own for each level",
         },

@@ -10,7 +10,7 @@ from scipy import special
 
 from mpam_calib.model.curves import level_stroke
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import LogNormal, LongTailed, Parameter
+from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
@@ -23,6 +23,7 @@ Fading = Callable[[Array, Values], Array]
 POWERS = ("power", "force-power", "test-power", "test-force-power")
 REACHING = ("virgin", "fresh", "test-virgin", "test-force-virgin")
 FADING = ("virgin-fading", "force-fading")
+RECOVERING = ("recovering", "force-recovering")
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -67,6 +68,19 @@ def _by_cycle(fading: Fading, over_test: bool = False) -> Share:
         return fading(state.readings.test_cycle if over_test else state.readings.cycle, values)
 
     return share
+
+
+def _recovering(state: State, values: Values, setting: Setting) -> Array:
+    """A part of what has softened recovers before each level, the rest stays soft for the whole test."""
+    share, cycles = np.clip(values["softening_recovers"], 0.0, 1.0), values["softening_cycles"]
+    anew, once = (np.exp((1.0 - n) / cycles) for n in (state.readings.cycle, state.readings.test_cycle))
+    return np.asarray(share * anew + (1.0 - share) * once)
+
+
+def _recovery(setting: Setting) -> tuple[Parameter, ...]:
+    share = Parameter("softening_recovers", Normal(0.5, 0.4), "share that recovers before a level", "", "")
+    cycles = Parameter("softening_cycles", LogNormal(1.2, 0.6), "cycles in which it softens", "", "")
+    return share, cycles
 
 
 def _by_stretch(fading: Fading, over_test: bool = False) -> Share:
@@ -147,19 +161,23 @@ register(
             "force-fading": _muscle(_by_stretch(_power)),
             "fresh": _bladder(_fresh),
             "path": _bladder(_path),
+            "recovering": _bladder(_recovering),
+            "force-recovering": _muscle(_recovering),
             "test-virgin": _bladder(_by_stretch(_constant, over_test=True)),
             "test-force-virgin": _muscle(_by_stretch(_constant, over_test=True)),
         },
         own=dict.fromkeys(POWERS, _exponent)
         | dict.fromkeys(REACHING, _reach)
         | dict.fromkeys(FADING, _reach_and_exponent)
+        | dict.fromkeys(RECOVERING, _recovery)
         | {"path": _strokes},
-        apart=("virgin-fading",),
+        apart=("virgin-fading", "force-recovering"),
         sources=dict.fromkeys(POWERS, "textbook: power of the cycle count (steep: the first cycle alone)")
         | dict.fromkeys(
             (*REACHING, *FADING),
             "Ogden & Roxburgh 1999, with the distance to the longest stroke in place of energies",
         )
+        | dict.fromkeys(RECOVERING, "softening of which a part recovers at rest (Diani et al. 2009)")
         | {"path": "continuous damage: e^(−way/s) (Miehe 1995, Eur. J. Mech. A 14)"},
         kinds={
             "force": "here the whole muscle, not the bladder alone",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mpam_calib.model.curves import middle_shape, signed_power
+from mpam_calib.model.curves import middle_pressure, middle_shape, signed_power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -68,6 +68,21 @@ def _tapered(state: State, values: Values, setting: Setting) -> State:
     return state._replace(length=state.length - values["tip_factor"] * lost * (state.rest.L0 - state.length))
 
 
+def _easing(state: State, values: Values, setting: Setting) -> State:
+    """The same, less as the pressure rises: k = 1 + a·e^(−P/p) + b, as at the middle pressure."""
+    past = (state.pressure - middle_pressure(setting)) / values["easing_kPa"]
+    share = values["tip_eased_share"]
+    part = 1.0 - share + share * np.exp(np.clip(-past, -3.0, 3.0))
+    return _tapered(state, {"tip_factor": values["tip_factor"] * part}, setting)
+
+
+def _eased(setting: Setting) -> tuple[Parameter, ...]:
+    pressure = Parameter(
+        "easing_kPa", LogNormal(0.5 * setting.top_pressure, 0.7), "pressure that eases the ends"
+    )
+    return (Parameter("tip_eased_share", Normal(0.5, 0.5), "share that pressure eases", "", ""), pressure)
+
+
 def _volume(state: State, values: Values, setting: Setting) -> State:
     """The muscle keeps its length, and the gas does no work on what its ends lack of the cylinder."""
     shape = SHAPES[state.kinematics](np.maximum(state.length, SHORTEST * state.rest.L0), state.rest)
@@ -86,12 +101,20 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"working": _working, "power": _power, "round": _round, "tapered": _tapered, "volume": _volume},
-        own={"power": _exponent},
+        forms={
+            "working": _working,
+            "power": _power,
+            "round": _round,
+            "tapered": _tapered,
+            "easing": _easing,
+            "volume": _volume,
+        },
+        own={"power": _exponent, "easing": _eased},
         sources={
             "working": "thesis Eq. 2.47 with the radius at L′ in place of that at L",
             "power": "textbook: sagitta of an arc over a fixed end, (R − R0)²; a cone of fixed slope, R − R0",
             "tapered": "conical ends: contraction times k (Tondu and Lopez 2000, doi:10.1109/37.833638)",
+            "easing": "the same with k = a·e^(−P) + b (Tondu and Lopez 2000)",
             "volume": "textbook: virtual work −P dV/dL of a cylinder with conical ends",
             "round": "textbook: hemispherical or elliptical end caps, a length in proportion to R",
         },
