@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rig import recipes, sets
+from scipy import signal
 
 from mpam_calib.criticism.noise_windows import between_strokes
 
@@ -61,6 +62,27 @@ def _scatter(white: float, correlated: float, rows: float) -> float:
     """sd of the mean of ROWS readings, of which the noise is correlated for so many."""
     lag = np.abs(np.subtract.outer(np.arange(ROWS), np.arange(ROWS)))
     return float(np.sqrt(white**2 / ROWS + correlated**2 * np.exp(-lag / rows).mean()))
+
+
+def test_a_loud_cell_s_slow_noise_is_told_as_a_quiet_one_s() -> None:
+    """The same noise a hundred times as large: a few strokes leave its slow part to what cells are like."""
+    specimen = specimen_of("develop-null-003")
+    loops = specimen.loops
+    assert loops is not None
+    rows = np.arange(len(loops.time_s))
+    rng = np.random.default_rng(3)
+    slow = signal.lfilter(
+        [np.sqrt(1.0 - np.exp(-2.0 / ROWS))], [1.0, -np.exp(-1.0 / ROWS)], rng.normal(size=len(rows))
+    )
+    noise = 0.8 * rng.normal(size=len(rows)) + 0.6 * slow
+    curve = 50.0 * (1.0 + loops.level) - 2e3 * loops.displacement_m + 2.0 * loops.branch
+    shares = []
+    for sd in (0.05, 5.0):
+        made = replace(specimen, loops=replace(loops, force_N=curve + sd * noise).without(loops.level > 2))
+        found = problem_of(made).noise_level
+        shares.append(found.correlated / found.white)
+    assert 0.4 < shares[0] < 1.0  # 0.75 is there
+    assert shares[1] == pytest.approx(shares[0], rel=0.25)
 
 
 @pytest.mark.parametrize("by_reading", [True, False])

@@ -184,3 +184,78 @@ def test_what_is_stretched_anew_is_ogden_and_roxburgh_s() -> None:
     so_far = np.maximum.accumulate(energy)
     expected = special.erf((1.0 - energy) / reach) - special.erf((so_far - energy) / reach)
     np.testing.assert_allclose((gain - 1.0) / 0.2, expected, atol=0.02)
+
+
+@pytest.mark.parametrize("gap", [0.05, 0.2, 0.6])
+def test_a_bladder_blown_up_to_the_braid_takes_a_thin_tube_s_pressure(gap: float) -> None:
+    """Neo-Hookean, held in length: stress μ(λ² − λ⁻²) in a wall of t/λ at the radius λr."""
+    before, after = applied("dead_band:balloon", P_DB_kPa=5e3, bladder_gap=gap)
+    length = before.rest.L0 - np.maximum(before.displacement, 0.0)
+    stretch = radius_inextensible_braid(length, before.rest) / before.rest.R0 * (1.0 + gap)
+    pressure = (stretch**2 - stretch**-2) / stretch / stretch
+    inside = before.displacement >= 0.0
+    lost = np.broadcast_to(before.pressure - after.pressure, pressure.shape)[inside]
+    np.testing.assert_allclose(lost / pressure[inside], np.median(lost / pressure[inside]), rtol=1e-9)
+    setting = setting_for("dead_band:balloon")
+    at = start(setting, middle(setting))
+    values = {"P_DB_kPa": one(5e3), "bladder_gap": one(gap)}
+    there = effect("dead_band:balloon").apply(at, values, setting)
+    np.testing.assert_allclose(at.pressure - there.pressure, 5e3)
+
+
+@pytest.mark.parametrize("power", [0.4, 1.0, 1.5])
+def test_a_stretched_relaxation_is_kohlrausch_s(power: float) -> None:
+    """ln(−ln(what is left)) rises with ln t by the power, whatever the size."""
+    before, after = applied("creep:stretched", creep_per_decade=0.05, relaxation_s=20.0, creep_stretch=power)
+    time = before.readings.time_at_level
+    end = 1.0 - np.exp(-((30.0 / 20.0) ** power))
+    done = (1.0 - after.gain[0]) / (0.05 * np.log10(31.0)) * end
+    seen = (time > 0.5) & (done < 1.0 - 1e-6)
+    slope, at_one = np.polyfit(np.log(time[seen]), np.log(-np.log1p(-done[seen])), 1)
+    assert slope == pytest.approx(power, rel=1e-6)
+    assert np.exp(-at_one / slope) == pytest.approx(20.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("form", ["recovering", "force-recovering"])
+@pytest.mark.parametrize("recovers", [0.0, 0.4, 1.0])
+def test_what_recovers_softens_anew_and_the_rest_stays(form: str, recovers: float) -> None:
+    kind = form.rpartition("recovering")[0]
+    _, anew = applied(f"stress_softening:{kind.strip('-')}".strip(":"), first_cycle_fraction=0.3)
+    _, once = applied(f"stress_softening:test-{kind}".strip("-"), first_cycle_fraction=0.3)
+    own = {"softening_recovers": recovers, "softening_cycles": 1.0}
+    _, found = applied(f"stress_softening:{form}", first_cycle_fraction=0.3, **own)
+    for name in ("gain", "wall_gain"):
+        mixed = recovers * getattr(anew, name) + (1.0 - recovers) * getattr(once, name)
+        np.testing.assert_allclose(getattr(found, name), mixed)
+    # Slower, what is left falls by the same factor with every cycle.
+    own = {"softening_recovers": 1.0, "softening_cycles": 2.5}
+    before, slow = applied(f"stress_softening:{form}", first_cycle_fraction=0.3, **own)
+    left = (slow.gain * slow.wall_gain)[0] - 1.0
+    np.testing.assert_allclose(left, 0.3 * np.exp((1.0 - before.readings.cycle) / 2.5))
+
+
+def test_grips_bed_in_with_each_cycle() -> None:
+    own = {"offset_mm": 2e-3, "offset_excess": -0.6, "bedding_cycles": 3.0}
+    before, after = applied("length_offset:bedding", **own)
+    moved = (after.displacement - before.displacement)[0]
+    loaded = before.readings.test_cycle - 1.0
+    np.testing.assert_allclose(moved, 2e-3 * (1.0 - 0.6 * np.exp(-loaded / 3.0)))
+
+
+def test_conical_ends_ease_as_tondu_and_lopez_have_it() -> None:
+    """k = a·e^(−P) + b: what is linear in e^(−P/p) at every contraction; without a, the plain cone."""
+    setting = setting_for("tip_shape:easing")
+    before = start(setting, rows(setting))
+    before = before._replace(length=before.rest.L0 - before.displacement)
+
+    def contraction(form: str, **values: float) -> np.ndarray:
+        after = effect(form).apply(before, {k: one(v) for k, v in values.items()}, setting)
+        return np.ravel(before.rest.L0 - after.length) / np.ravel(before.displacement)
+
+    own = {"tip_factor": 0.8, "easing_kPa": 9e4}
+    k = contraction("tip_shape:easing", tip_eased_share=0.7, **own)
+    fading = np.exp(-np.ravel(before.pressure) / 9e4)
+    np.testing.assert_allclose(k, np.polyval(np.polyfit(fading, k, 1), fading), rtol=1e-9)
+    assert k.max() - k.min() > 0.01
+    plain = contraction("tip_shape:tapered", tip_factor=0.8)
+    np.testing.assert_allclose(contraction("tip_shape:easing", tip_eased_share=0.0, **own), plain)

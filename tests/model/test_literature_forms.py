@@ -209,6 +209,7 @@ def test_a_form_starts_near_the_effect_s_own_equation(form: str) -> None:
     [
         "length_offset:slip",
         "length_offset:settling",
+        "length_offset:bedding",
         "pressure_droop:speed",
         "pressure_droop:lagging",
         "pressure_droop:volume",
