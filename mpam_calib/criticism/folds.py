@@ -23,10 +23,10 @@ def folds_of(labels: Labels) -> list[Labels]:
 
 
 def log_densities(residual: Array, covariance: Array, label: Labels) -> Array:
-    """Log density of a residual (h,) under N(0, covariance), by the label (h,) of its rows, ascending.
+    """Log density of a residual (h,) under N(0, covariance), parted by the label (h,) of its rows: (labels,).
 
-    Each row counts given those before it: the parts make up the joint density, and what two labels are both
-    off by counts once, so that the scatter of the parts says how sure their sum is.
+    Each row counts given those before it. So the parts make up the joint density, and what two labels are
+    both off by counts once: their scatter says how sure the sum is.
     """
     lower = linalg.cholesky(covariance, lower=True)
     z = linalg.solve_triangular(lower, residual, lower=True)

@@ -65,7 +65,8 @@ def test_a_set_of_three_leaves_the_kinds_of_its_parts(tmp_path: Path) -> None:
     found.bend_all([(three, 0), (PAIR, 0)])
     assert set(found.fits) == {(three, 0)}
     better = found.fits[three, 0]
-    assert "stress_softening:force-bent" in better.effects
+    # Of the whole force again, not the test's first cycles alone: bent, or some of it recovering.
+    assert better.effects & {"stress_softening:force-bent", "stress_softening:force-recovering"}
     assert better.log_evidence > wrong.log_evidence + 10.0
 
 

@@ -66,7 +66,7 @@ def _settling(state: State, values: Values, setting: Setting) -> State:
 
 
 def _bedding(state: State, values: Values, setting: Setting) -> State:
-    """The same, from cycle to cycle: the grips bed in as they are loaded."""
+    """There from the start, and more or less of it in the first cycles: the grips bed in under load."""
     fading = np.exp((1.0 - state.readings.test_cycle) / values["bedding_cycles"])
     part = 1.0 + values["offset_excess"] * fading
     return state._replace(displacement=state.displacement + values["offset_mm"] * part)
@@ -136,7 +136,7 @@ register(
             "line": "textbook: a displacement sensor's calibration line, wrong in zero and gain",
             "slip": "textbook: first-order settling of a clamp, 1 − exp(−t/τ)",
             "settling": "textbook: an offset with an exponential transient, 1 + c·exp(−t/τ)",
-            "bedding": "textbook: the same by the count of load cycles (preconditioning of grips)",
+            "bedding": "textbook: an offset that settles with each load cycle, 1 + c·exp(−N/n)",
             "seating": "textbook: end fittings that seat under pressure, δ·(P/P_middle)^m",
             "rezeroed": "textbook: repeatability of a zero, an error of its own for each level",
         },

@@ -69,7 +69,7 @@ def _tapered(state: State, values: Values, setting: Setting) -> State:
 
 
 def _easing(state: State, values: Values, setting: Setting) -> State:
-    """The same, less as the pressure rises: k = 1 + a·e^(−P/p) + b, as at the middle pressure."""
+    """Tapered ends, less as the pressure rises, k = b + a·e^(−P/p); as above at the middle pressure."""
     past = (state.pressure - middle_pressure(setting)) / values["easing_kPa"]
     share = values["tip_eased_share"]
     part = 1.0 - share + share * np.exp(np.clip(-past, -3.0, 3.0))
@@ -114,7 +114,7 @@ register(
             "working": "thesis Eq. 2.47 with the radius at L′ in place of that at L",
             "power": "textbook: sagitta of an arc over a fixed end, (R − R0)²; a cone of fixed slope, R − R0",
             "tapered": "conical ends: contraction times k (Tondu and Lopez 2000, doi:10.1109/37.833638)",
-            "easing": "the same with k = a·e^(−P) + b (Tondu and Lopez 2000)",
+            "easing": "conical ends, contraction times k = a·e^(−P) + b (Tondu and Lopez 2000)",
             "volume": "textbook: virtual work −P dV/dL of a cylinder with conical ends",
             "round": "textbook: hemispherical or elliptical end caps, a length in proportion to R",
         },
