@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mpam_calib.model.curves import half_test, middle_pressure, power, settled
 from mpam_calib.model.effect import Effect, Stage, Values, register
@@ -60,14 +61,15 @@ def _exponent(setting: Setting) -> tuple[Parameter, ...]:
 
 def _settling(state: State, values: Values, setting: Setting) -> State:
     """There from the start, and more or less of it at first."""
-    fading = np.exp(-state.readings.time / values["slip_s"])
-    part = 1.0 + values["offset_excess"] * fading
-    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
+    return _excessive(state, values, np.exp(-state.readings.time / values["slip_s"]))
 
 
 def _bedding(state: State, values: Values, setting: Setting) -> State:
-    """There from the start, and more or less of it in the first cycles: the grips bed in under load."""
-    fading = np.exp((1.0 - state.readings.test_cycle) / values["bedding_cycles"])
+    """The same by the count of cycles: the grips bed in as they are loaded."""
+    return _excessive(state, values, np.exp((1.0 - state.readings.test_cycle) / values["bedding_cycles"]))
+
+
+def _excessive(state: State, values: Values, fading: NDArray[np.float64]) -> State:
     part = 1.0 + values["offset_excess"] * fading
     return state._replace(displacement=state.displacement + values["offset_mm"] * part)
 
