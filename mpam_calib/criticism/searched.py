@@ -177,6 +177,21 @@ class Search:
         listed = [s for s in sets if any((s, size) in self.fits for size in range(len(SIZES)))]
         self.polish_all((s, size) for s in listed for size in (0, self.best_size(s)))
 
+    def even_out(self, sets: Iterable[Set]) -> None:
+        """Refit sets beside every remainder in the forms that suit them best beside one of these."""
+        leads = {s: self.best_fit(s) for s in sets}
+        keys = [
+            (s, size)
+            for s, lead in leads.items()
+            for size in range(len(SIZES))
+            if (s, size) in self.fits and self.fits[s, size].effects != lead.effects
+        ]
+        tries = [[(tuple(sorted(leads[s].effects)), ended(leads[s]))] for s, _ in keys]
+        tasks = [(size, each, self.doubting) for (_, size), each in zip(keys, tries, strict=True)]
+        for key, fit in zip(keys, self.spread(best_of, tasks, chunk=4), strict=True):
+            if fit is not None and fit.log_evidence > self.fits[key].log_evidence:
+                self.fits[key] = fit
+
     def swap(self, effects: Set) -> None:
         """Refit sets with another cause in the place of one; the others had the forms of poorer company."""
         found = self.best_fit(effects)

@@ -97,6 +97,33 @@ def test_a_leader_s_causes_keep_their_forms_beside_another(tmp_path: Path) -> No
     assert found.fits[true, 0] is best
 
 
+def test_a_form_found_beside_one_remainder_is_tried_beside_all(tmp_path: Path) -> None:
+    """Softening of the whole force was found beside no remainder; beside another the poor form remained."""
+    problem = hiding([("order_too_low", 40.0), ("stress_softening", 8.0)], tmp_path)
+    good, poor = (
+        frozenset({"order_too_low", f}) for f in ("stress_softening:force", "stress_softening:bent")
+    )
+    single = frozenset({"order_too_low"})
+    fits = {
+        (PAIR, 0): fit(problem, good, 0),
+        (PAIR, 1): fit(problem, poor, 1),
+        (single, 1): fit(problem, single, 1),
+    }
+    kept = replace(fits[PAIR, 1], log_evidence=fits[PAIR, 0].log_evidence - 1.0)
+    found = Search(problem, tuple(sorted(PAIR)), Alone(problem), fits=dict(fits))
+    found.even_out([PAIR])
+    assert set(found.fits) == set(
+        fits
+    )  # no set is new, and none beside a remainder that it was not seen beside
+    assert found.fits[PAIR, 1].effects == good
+    assert found.fits[PAIR, 1].log_evidence > fits[PAIR, 1].log_evidence + 5.0
+    assert all(found.fits[key] is fits[key] for key in ((PAIR, 0), (single, 1)))
+    # What is better than that stays.
+    found.fits[PAIR, 1] = kept
+    found.even_out([PAIR])
+    assert found.fits[PAIR, 1] is kept
+
+
 def test_beside_two_others_a_cause_has_the_form_that_it_had_beside_one() -> None:
     """Alone, creep of the wall may make up for a bent law of pressure; beside the law it is what it is."""
     problem = problem_of(specimen_of("develop-null-001"))
