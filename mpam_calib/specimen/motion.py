@@ -22,6 +22,8 @@ FEWEST, USUAL = 8, 0.99
 """Rows that tell a signal's noise, and the share of their differences that are no turns and jumps."""
 SHARP = 0.5
 """Share of the noise that is left without turns where these were most of it: gentle ones are not."""
+MIXED, NORMAL = 3.0, 0.6745
+"""Times the usual row's noise that a mean square is believed up to, and normal noise's median in its sd."""
 
 SIDE = 4
 """Rows at least on either side of a turn that tell where it is."""
@@ -57,12 +59,17 @@ def noise_sd(values: Floats, order: int = 2) -> float:
 
     From differences of this order, in which motion cancels that is steady (order 2) or gently changing
     (above); the largest hundredth (turns, jumps) is left out. Strokes of few rows turn more often: where
-    their turns are sharp, only differences that span none are asked. 0 for fewer than eight rows.
+    their turns are sharp, only differences that span none are asked. Of slow strokes and a few that are too
+    fast for their rows the usual row tells. 0 for fewer than eight rows.
     """
     if len(values) < FEWEST:
         return 0.0
     differences = np.diff(values, n=order)
     sd = _sd_of(differences, order)
+    # A coarse encoder stands still for most rows: its noise is of its quantum.
+    usual = max(float(np.median(np.abs(differences))) / NORMAL / _grows(order), _quantum(values))
+    if sd > MIXED * usual:
+        return usual
     turns = turning_points(values, max(RANGE_SHARE * float(np.ptp(values)), NOISE_SDS * sd))[1:-1]
     if len(turns) * (order - 1) <= (1.0 - USUAL) * len(differences):
         return sd
@@ -76,7 +83,17 @@ def noise_sd(values: Floats, order: int = 2) -> float:
 def _sd_of(differences: Floats, order: int) -> float:
     square = differences**2
     kept = square[square <= np.quantile(square, USUAL)]
-    return float(np.sqrt(kept.mean() / comb(2 * order, order))) if len(kept) else 0.0
+    return float(np.sqrt(kept.mean())) / _grows(order) if len(kept) else 0.0
+
+
+def _grows(order: int) -> float:
+    """Times the noise of one value that differences of this order have."""
+    return float(np.sqrt(comb(2 * order, order)))
+
+
+def _quantum(values: Floats) -> float:
+    """The smallest step between two values that differ; 0 where all are one."""
+    return float(np.diff(np.unique(values)).min(initial=np.inf)) if np.ptp(values) > 0.0 else 0.0
 
 
 def turning_points(values: Floats, threshold: float) -> Ints:

@@ -138,8 +138,12 @@ def test_fast_strokes_between_long_holds() -> None:
 
 
 def test_a_hold_ends_at_its_last_row_however_the_encoder_rustles() -> None:
-    """Reached and left halfway between two rows at full speed; noise of a ten-thousandth of the stroke."""
+    """Reached and left halfway between two rows at full speed; noise of a ten-thousandth of the stroke.
+
+    Of two rows beside a hold's end and a little more none is wrong without being known as unclear.
+    """
     rng = np.random.default_rng(5)
+    unclear = 0
     for _ in range(20):
         strokes, truth = [], []
         for number, rows in enumerate(np.repeat(rng.integers(9, 16) * np.array([1, 5, 1]), 2)):
@@ -148,9 +152,43 @@ def test_a_hold_ends_at_its_last_row_however_the_encoder_rustles() -> None:
             truth.append(np.full(len(way), -1 if number % 2 == 0 else 1))
         x = np.concatenate(strokes)
         x = np.round(x + 0.0027 * rng.normal(size=len(x)), 4)
-        np.testing.assert_array_equal(
-            read_motion(x, turn_threshold(x), noise_sd(x)).branch, np.concatenate(truth)
-        )
+        found = read_motion(x, turn_threshold(x), noise_sd(x))
+        assert (found.branch == np.concatenate(truth))[~found.unclear].all()
+        unclear += int(found.unclear.sum())
+    assert unclear <= 2.5 * 20 * 5
+
+
+@pytest.mark.parametrize("encoder", [0.0, 1e-4, 1e-3])
+@pytest.mark.parametrize("shape", ["full speed", "gentle", "trapezoid"])
+def test_a_few_strokes_too_fast_for_their_rows(shape: str, encoder: float) -> None:
+    """Of 5 to 12 rows among slow ones of ten times as many: what they turn is no noise of the encoder.
+
+    ``encoder`` is its sd in strokes. By a mean square it came out at a fiftieth of the stroke, and up to
+    five rows of every slow stroke that followed a fast one had its branch.
+    """
+    rng = np.random.default_rng(7)
+    wrong, unclear, strokes = 0, 0, 0
+    for fast, pattern in [
+        (r, p) for r in (5, 8, 12) for p in ((1, 1, 10, 1), (1, 10, 1, 10)) for _ in range(4)
+    ]:
+        rows = np.repeat(fast * np.array(pattern, dtype=float), 2)
+        ends = np.concatenate([[0.0], np.cumsum(rows)])
+        t = np.arange(rng.uniform(), ends[-1])
+        number = np.searchsorted(ends, t, side="right") - 1
+        share = (t - ends[number]) / rows[number]
+        way = {
+            "full speed": share,
+            "gentle": 0.5 * (1.0 - np.cos(np.pi * share)),
+            "trapezoid": np.interp(share, *trapezoid()),
+        }[shape]
+        x = 20.0 * (np.where(number % 2 == 0, way, 1.0 - way) + encoder * rng.standard_normal(len(t)))
+        x = np.round(x, 4)
+        found = read_motion(x, turn_threshold(x), noise_sd(x))
+        wrong += np.count_nonzero((found.branch != np.where(number % 2 == 0, -1, 1)) & ~found.unclear)
+        unclear += np.count_nonzero(found.unclear)
+        strokes += len(rows)
+    assert wrong / strokes < 0.1
+    assert unclear / strokes < 3.5
 
 
 @pytest.mark.parametrize("quantum", [0.0, 0.001, 0.01, 0.05])
