@@ -127,6 +127,9 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "hum_N": _round(verdict.faults.hum),
         "step_N": _round(verdict.faults.step),
         "chatter_N": _round(verdict.faults.chatter),
+        "trace": None
+        if verdict.trace is None
+        else {"against": verdict.trace.against, "rms_N": _round(verdict.trace.size)},
         "load_cell_nats": None if verdict.load_cell is None else _round(verdict.load_cell),
         "load_cell_fault": verdict.cell_fault,
         "searched": {

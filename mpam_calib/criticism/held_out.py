@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from mpam_calib.criticism.fit import fit
 from mpam_calib.criticism.folds import FEWEST, folds_of, log_densities, total
-from mpam_calib.criticism.gain import Z90, predict_rows
+from mpam_calib.criticism.gain import Z90
+from mpam_calib.criticism.predicted import predict_rows
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.ranking import Ranked, blueprint_of
 from mpam_calib.criticism.spread import held_problem

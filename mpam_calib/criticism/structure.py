@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import linalg, stats
 
 from mpam_calib.criticism.fit import Fit
-from mpam_calib.criticism.gain import linearise
+from mpam_calib.criticism.predicted import linearise
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.model.readings import Readings
 

@@ -9,12 +9,13 @@ import numpy as np
 
 from mpam_calib.criticism.budget import remainder_rms, structured
 from mpam_calib.criticism.faults import FAULTLESS, Faults, faults_of
-from mpam_calib.criticism.fit import by_equations
+from mpam_calib.criticism.fit import Fit, by_equations
 from mpam_calib.criticism.free_strokes import score_beside
 from mpam_calib.criticism.load_cell import NO_RIVAL, load_cell_rival
-from mpam_calib.criticism.problem import SIZES
+from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.refits import Set
 from mpam_calib.criticism.searched import Search
+from mpam_calib.criticism.structure import Structure, structure_tests
 
 Word = Literal["adequate", "named", "ambiguous", "unexplained"]
 
@@ -27,6 +28,9 @@ BESIDE = 10.0
 """Nats below the likeliest set down to which these data hardly separate others from it."""
 NOISE_SIZE = 0.5
 """A remainder whose root mean square is below this share of a reading's noise is at its level."""
+TRACE, TRACE_SIZE = 1e-6, 0.2
+"""p-value of a test of structure from which on the likeliest set leaves something that no noise explains, and
+its root mean square as a share of a reading's noise: the tests suppose that the noise is known."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +39,9 @@ class Verdict:
 
     ``standing`` are the causes that hold even beside a remainder; ``size`` indexes the remainder's size
     under the leading set, which leaves the ``faults``; ``load_cell`` is by how many nats a load cell at fault
-    (``cell_fault``) beats that set, where it comes near; ``unseen`` are the sets with one cause more that the
-    data do not exclude, unless structure is left that would pass for it.
+    (``cell_fault``) beats that set, where it comes near; ``trace`` what that set's residuals still depend on;
+    ``unseen`` are the sets with one cause more that the data do not exclude, unless structure is left that
+    would pass for it.
     """
 
     word: Word
@@ -48,6 +53,7 @@ class Verdict:
     faults: Faults = FAULTLESS
     load_cell: float | None = None
     cell_fault: str = ""
+    trace: Structure | None = None
     unseen: frozenset[Set] = frozenset()
 
     def others(self) -> dict[Set, float]:
@@ -80,7 +86,8 @@ def judge(found: Search) -> Verdict:
     problem = found.problem
     faults = faults_of(problem, found.fits[leading, size])
     unlessened = bool(leading) and not _lessens(found, leading)
-    left = bool(faults) or unlessened or _structure_left(found, leading, size)
+    trace = _trace(problem, found.fits[leading, size])
+    left = bool(faults) or unlessened or trace is not None or _structure_left(found, leading, size)
     # Where nothing is the likeliest, or cannot be excluded, no structure beyond the noise was shown.
     nothing = not leading or (frozenset() in sets[:LISTED] and probabilities[frozenset()] > 1.0 - SURE)
     rival = load_cell_rival(found, leading) if left or not nothing else NO_RIVAL
@@ -91,7 +98,7 @@ def judge(found: Search) -> Verdict:
             standing &= rival.beside
         if not _lessens(found, standing):
             standing = frozenset()
-        held = Verdict("unexplained", leading, standing, probabilities, marginals, size, faults)
+        held = Verdict("unexplained", leading, standing, probabilities, marginals, size, faults, trace=trace)
         return replace(held, load_cell=rival.lead, cell_fault=rival.fault) if gives_way else held
     if nothing:
         size = found.best_size(frozenset())
@@ -123,6 +130,13 @@ def _structure_left(found: Search, leading: Set, size: int) -> bool:
     if bare is not None and held.log_evidence - bare.log_evidence < LEAD:
         return False
     return remainder_rms(found.problem, held) > NOISE_SIZE * found.problem.noise_level.total
+
+
+def _trace(problem: Problem, fitted: Fit) -> Structure | None:
+    """The clearest thing that a fit's residuals still depend on, if any."""
+    least = TRACE_SIZE * problem.noise_level.total
+    seen = [t for t in structure_tests(problem, fitted) if t.p_value < TRACE and t.size > least]
+    return min(seen, key=lambda t: t.p_value, default=None)
 
 
 def _lessens(found: Search, effects: Set) -> bool:

@@ -50,7 +50,10 @@ def unremoved(content: dict[str, Any]) -> list[str]:
         by = "better" if content["load_cell_nats"] > 0.0 else "nearly as well"
         cell, look = CELL_FAULTS[content["load_cell_fault"]]
         found.append(f"a load cell {cell} explains the readings {by}: {look}")
-    elif content["remainder_N"] > 0.0 or not found:
+    elif content["remainder_N"] > 0.0 or not (found or content["trace"]):
         size = significant(content["remainder_N"])
         found.append(f"structure of {size} N is left beside every set tried")
+    if content["trace"]:
+        size, against = significant(content["trace"]["rms_N"]), content["trace"]["against"]
+        found.append(f"what the likeliest set leaves still depends on {against} ({size} N)")
     return found

@@ -11,7 +11,8 @@ from rig import sets
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.fit import fit
 from mpam_calib.criticism.folds import FEWEST
-from mpam_calib.criticism.gain import Z90, measure_gain, predict_rows
+from mpam_calib.criticism.gain import Z90, measure_gain
+from mpam_calib.criticism.predicted import predict_rows
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.searched import Search
 from mpam_calib.criticism.spread import Alone

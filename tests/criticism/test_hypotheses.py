@@ -14,7 +14,7 @@ from scipy import stats
 
 from mpam_calib.criticism.candidates import candidates
 from mpam_calib.criticism.fit import chain_for, fit
-from mpam_calib.criticism.gain import linearise
+from mpam_calib.criticism.predicted import linearise
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.model.bend import is_bend
 from mpam_calib.model.blueprint import Options, draw_blueprint

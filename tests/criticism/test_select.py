@@ -52,7 +52,7 @@ def test_held_out_levels_are_predicted_from_the_others() -> None:
     problem = problem_of(specimen_of(recipe.name))
     held = problem.level == problem.level.max()
     index = (np.flatnonzero(~held), np.flatnonzero(held))
-    from mpam_calib.criticism.gain import predict_rows
+    from mpam_calib.criticism.predicted import predict_rows
 
     fitted = fit(problem.take(~held), frozenset(), 0)
     mean, covariance = predict_rows(problem, fitted, index)

@@ -56,6 +56,26 @@ def test_a_cause_that_leaves_more_than_there_was_is_not(problem: Problem) -> Non
     assert (verdict.word, verdict.standing) == ("unexplained", NOTHING)
 
 
+@pytest.mark.parametrize(("size", "word"), [(1.0, "unexplained"), (0.1, "named")])
+def test_a_set_whose_residuals_still_depend_on_something_is_not_named(
+    problem: Problem, size: float, word: str
+) -> None:
+    """However far it leads; ``size`` is the swing's amplitude in a reading's noise."""
+    found = search_where_the_cause_leaves(problem, 0.1)
+    leading = found.fits[CAUSE, 0]
+    way = problem.middle().displacement
+    swing = size * problem.noise_level.total * np.cos(3.0 * np.pi * way / way.max())
+    root = np.linalg.cholesky(problem.noise)
+    noise = root @ np.random.default_rng(2).standard_normal(len(problem))
+    found.fits[CAUSE, 0] = replace(leading, force=problem.force - noise - swing)
+    verdict = judge(found)
+    assert verdict.word == word
+    assert (verdict.trace is None) == (word == "named")
+    if verdict.trace is not None:
+        assert verdict.trace.against in ("contraction", "branch")
+        assert verdict.trace.size > 0.3 * problem.noise_level.total
+
+
 def search_beside_a_remainder(problem: Problem, margin: float, misfit: float) -> Search:
     """A search whose cause needs the largest remainder and leads by a margin (nats) beside it.
 

@@ -14,6 +14,7 @@ FAULTLESS = {
     ),
     "load_cell_nats": None,
     "load_cell_fault": "load_cell",
+    "trace": None,
 }
 
 
@@ -53,3 +54,10 @@ def test_a_fault_is_told_with_its_size_and_what_may_cause_it(fault: str, said: s
     (text,) = unremoved(FAULTLESS | {fault: 1.234})
     assert "1.23 N" in text
     assert said in text
+
+
+def test_what_the_residuals_depend_on_is_told_beside_a_remainder() -> None:
+    trace = {"trace": {"against": "branch", "rms_N": 0.0456}}
+    (text,) = unremoved(FAULTLESS | trace)
+    assert "still depends on branch (0.0456 N)" in text
+    assert len(unremoved(FAULTLESS | trace | {"remainder_N": 1.234})) == 2
