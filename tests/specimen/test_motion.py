@@ -176,11 +176,7 @@ def test_a_few_strokes_too_fast_for_their_rows(shape: str, encoder: float) -> No
         t = np.arange(rng.uniform(), ends[-1])
         number = np.searchsorted(ends, t, side="right") - 1
         share = (t - ends[number]) / rows[number]
-        way = {
-            "full speed": share,
-            "gentle": 0.5 * (1.0 - np.cos(np.pi * share)),
-            "trapezoid": np.interp(share, *trapezoid()),
-        }[shape]
+        way = way_of(shape, share)
         x = 20.0 * (np.where(number % 2 == 0, way, 1.0 - way) + encoder * rng.standard_normal(len(t)))
         x = np.round(x, 4)
         found = read_motion(x, turn_threshold(x), noise_sd(x))
@@ -207,11 +203,7 @@ def test_rows_that_no_motion_tells_are_few_and_known(shape: str, hold: float, qu
         t = np.arange(rng.uniform(0.0, step), 2 * cycles * (time + hold), step)
         number = np.minimum((t / (time + hold)).astype(int), 2 * cycles - 1)
         share = np.minimum((t - number * (time + hold)) / time, 1.0)
-        way = {
-            "full speed": share,
-            "gentle": 0.5 * (1.0 - np.cos(np.pi * share)),
-            "trapezoid": np.interp(share, *trapezoid()),
-        }[shape]
+        way = way_of(shape, share)
         x = 20.0 * np.where(number % 2 == 0, way, 1.0 - way)
         x = np.round(x / quantum) * quantum if quantum else x
         found = read_motion(x, turn_threshold(x), noise_sd(x))
@@ -247,6 +239,15 @@ def test_a_crosshead_that_gathers_its_speed_in_a_few_rows_is_not_held(ramp: floa
         strokes += len(paces)
     assert wrong / strokes < 0.05
     assert unclear / strokes < 3.5
+
+
+def way_of(shape: str, share: np.ndarray) -> np.ndarray:
+    """Share of a stroke's way after each share of its time."""
+    return {
+        "full speed": share,
+        "gentle": 0.5 * (1.0 - np.cos(np.pi * share)),
+        "trapezoid": np.interp(share, *trapezoid()),
+    }[shape]
 
 
 def trapezoid() -> tuple[np.ndarray, np.ndarray]:
