@@ -127,7 +127,7 @@ def _finish(found: Search, width: int, tell: Callable[[float], None]) -> None:
         for size in range(len(SIZES)):
             found.refit_all((effects, size) for effects in [*parts, *leaders])
         found.polish([*parts, *leaders])
-        found.even_out(dict.fromkeys([*parts, *leaders]))
+        found.even_out([*parts, *leaders])
     first = found.sets[0]
     found.refit_all(
         (further, size) for further in found.with_one_more(first) for size in {0, found.best_size(first)}

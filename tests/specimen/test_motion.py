@@ -163,8 +163,8 @@ def test_a_hold_ends_at_its_last_row_however_the_encoder_rustles() -> None:
 def test_a_few_strokes_too_fast_for_their_rows(shape: str, encoder: float) -> None:
     """Of 5 to 12 rows among slow ones of ten times as many: what they turn is no noise of the encoder.
 
-    ``encoder`` is its sd in strokes. By a mean square it came out at a fiftieth of the stroke, and up to
-    five rows of every slow stroke that followed a fast one had its branch.
+    ``encoder`` is its sd in strokes. By a mean square it came out so large that readings of slow strokes
+    had the branch of the fast one before (trapezoids fail this test by it).
     """
     rng = np.random.default_rng(7)
     wrong, unclear, strokes = 0, 0, 0
