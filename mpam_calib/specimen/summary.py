@@ -68,13 +68,19 @@ def summarise_loops(loops: Loops, levels_Pa: Floats, L0: float) -> LoopsSummary:
 
 
 def stroke_speeds(loops: Loops) -> Floats:
-    """Speed of every stroke in m/s, shape (strokes,): over the middle half of its travel."""
+    """Speed of every stroke in m/s, shape (strokes,): over the middle half of its travel.
+
+    Where fewer than two readings lie there, between those on either side; 0 where there are none.
+    """
     starts = run_starts(loops.stroke)
     speeds = np.zeros(len(starts))
     ends = [*starts[1:], len(loops.stroke)]
     for i, (start, end) in enumerate(zip(starts, ends, strict=True)):
         travel = np.abs(loops.displacement_m[start:end] - loops.displacement_m[start])
         inside = np.flatnonzero((travel > 0.25 * travel.max()) & (travel < 0.75 * travel.max()))
+        if len(inside) < 2 and abs(loops.branch[start]) == 1:
+            beyond = int(np.argmax(travel >= 0.75 * travel.max()))
+            inside = np.array([*np.flatnonzero(travel[:beyond] <= 0.25 * travel.max())[-1:], beyond])
         if len(inside) > 1:
             first, last = start + inside[0], start + inside[-1]
             time = loops.time_s[last] - loops.time_s[first]

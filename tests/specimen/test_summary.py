@@ -1,0 +1,32 @@
+"""What ``check`` lists of a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpam_calib.specimen import read
+from mpam_calib.specimen.summary import summarise_loops
+
+from .folders import DECLARATION, HEADER, make
+
+RATE, LEVEL, TOP_MM, STROKES = 10.0, 100.0, 10.0, 8
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.7])
+@pytest.mark.parametrize("rows", [4, 5, 6, 8, 40])
+def test_a_speed_is_listed_however_few_readings_a_stroke_has(
+    tmp_path: Path, rows: int, phase: float
+) -> None:
+    """A triangle that turns at a reading, or a share of the way between two of them before it."""
+    t = (np.arange(rows * STROKES) + phase) / RATE
+    x = TOP_MM * np.abs((t * RATE / rows + 1.0) % 2.0 - 1.0)
+    force = 30.0 - x + np.where(t * RATE / rows % 2.0 < 1.0, -0.5, 0.5)
+    text = "\n".join(f"{a:.3f},{LEVEL},{b:.5f},{c:.5f}" for a, b, c in zip(t, x, force, strict=True))
+    declaration = DECLARATION.replace('"linear"', '"constant"')
+    specimen = read(make(tmp_path, declaration, loops=f"{HEADER}\n{text}\n"))
+    assert specimen.loops is not None and specimen.geometry is not None
+    (level,) = summarise_loops(specimen.loops, specimen.levels_Pa, specimen.geometry.L0).levels
+    assert level.speeds_mm_per_min == pytest.approx((TOP_MM * RATE / rows * 60.0,), rel=0.05)
