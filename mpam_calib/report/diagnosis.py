@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mpam_calib.criticism.diagnose import Diagnosis
-from mpam_calib.criticism.verdict import BESIDE
+from mpam_calib.criticism.verdict import BESIDE, TRACE, TRACE_SIZE
 from mpam_calib.model.bend import FORM, is_bend
 from mpam_calib.model.effect import effect
 from mpam_calib.model.priors import Parameter
@@ -162,7 +162,8 @@ def _structure(content: dict[str, Any]) -> list[Block]:
     ]
     text = (
         "Each row asks whether the residuals still depend on something. Without structure p is evenly spread "
-        "between 0 and 1; below 0.001 there is structure."
+        "between 0 and 1; below 0.001 there is structure. As the noise is only estimated, the verdict turns "
+        f"on it only where p is below {TRACE:.6f} and the size above {TRACE_SIZE:g} times a reading's noise."
     )
     formats = dict.fromkeys(["p before", "p after"], "{}")
     formats |= dict.fromkeys(["size before (N)", "size after (N)"], "{:.2g}")

@@ -17,7 +17,7 @@ from mpam_calib.criticism import search as procedure
 from mpam_calib.criticism.climb import Climb, Place
 from mpam_calib.criticism.fit import chain_for, doubt_on_rows, fit
 from mpam_calib.criticism.forms import flexible, forms_of, price
-from mpam_calib.criticism.problem import Problem
+from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.criticism.refits import best_of, with_better_forms, with_doubt, with_doubted_equations
 from mpam_calib.criticism.search import search
 from mpam_calib.criticism.searched import NEAR, POLISHED, Search
@@ -112,9 +112,8 @@ def test_a_form_found_beside_one_remainder_is_tried_beside_all(tmp_path: Path) -
     kept = replace(fits[PAIR, 1], log_evidence=fits[PAIR, 0].log_evidence - 1.0)
     found = Search(problem, tuple(sorted(PAIR)), Alone(problem), fits=dict(fits))
     found.even_out([PAIR])
-    assert set(found.fits) == set(
-        fits
-    )  # no set is new, and none beside a remainder that it was not seen beside
+    # No set is new, and none beside a remainder that it was not seen beside.
+    assert set(found.fits) == set(fits)
     assert found.fits[PAIR, 1].effects == good
     assert found.fits[PAIR, 1].log_evidence > fits[PAIR, 1].log_evidence + 5.0
     assert all(found.fits[key] is fits[key] for key in ((PAIR, 0), (single, 1)))
@@ -122,6 +121,21 @@ def test_a_form_found_beside_one_remainder_is_tried_beside_all(tmp_path: Path) -
     found.fits[PAIR, 1] = kept
     found.even_out([PAIR])
     assert found.fits[PAIR, 1] is kept
+
+
+def test_the_search_ends_with_its_leaders_in_one_form_beside_all_remainders(tmp_path: Path) -> None:
+    problem = hiding([("order_too_low", 40.0), ("stress_softening", 8.0)], tmp_path)
+    good, poor = (
+        frozenset({"order_too_low", f}) for f in ("stress_softening:force", "stress_softening:bent")
+    )
+    found = Search(problem, tuple(sorted(PAIR)), Alone(problem))
+    for size in range(len(SIZES)):
+        found.refit_all((frozenset(s), size) for k in range(2) for s in combinations(sorted(PAIR), k))
+        found.fits[PAIR, size] = fit(problem, good if size == 0 else poor, size)
+    assert found.best_size(PAIR) == 0
+    procedure._finish(found, 1, lambda share: None)
+    forms = {undoubted(found).fits[PAIR, size].effects for size in range(len(SIZES))}
+    assert forms == {undoubted(found).fits[PAIR, 0].effects}
 
 
 def test_beside_two_others_a_cause_has_the_form_that_it_had_beside_one() -> None:

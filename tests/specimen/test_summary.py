@@ -17,9 +17,7 @@ RATE, LEVEL, TOP_MM, STROKES = 10.0, 100.0, 10.0, 8
 
 @pytest.mark.parametrize("phase", [0.0, 0.3, 0.7])
 @pytest.mark.parametrize("rows", [4, 5, 6, 8, 40])
-def test_a_speed_is_listed_however_few_readings_a_stroke_has(
-    tmp_path: Path, rows: int, phase: float
-) -> None:
+def test_a_speed_is_listed_however_few_readings_a_stroke_has(tmp_path: Path, rows: int, phase: float) -> None:
     """A triangle that turns at a reading, or a share of the way between two of them before it."""
     t = (np.arange(rows * STROKES) + phase) / RATE
     x = TOP_MM * np.abs((t * RATE / rows + 1.0) % 2.0 - 1.0)
