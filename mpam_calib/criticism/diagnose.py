@@ -18,6 +18,7 @@ from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.refits import Set
 from mpam_calib.criticism.search import search
 from mpam_calib.criticism.searched import LARGEST, Search
+from mpam_calib.criticism.sizes import Sizes, sizes_of
 from mpam_calib.criticism.structure import Structure, structure_tests
 from mpam_calib.criticism.verdict import Verdict, judge
 from mpam_calib.errors import InputError
@@ -45,6 +46,8 @@ class Diagnosis:
     """Every test of structure before and after."""
     limits: dict[str, Band]
     """How large each further effect could be unseen (SI), where nothing is left that would pass for it."""
+    sizes: Sizes
+    """Those of the causes."""
 
     @property
     def causes(self) -> list[str]:
@@ -91,10 +94,11 @@ def diagnose(
     fits = [found.fits[s, found.best_size(s)] for s in (frozenset(), verdict.standing)]
     structure = list(zip(*(structure_tests(problem, f) for f in fits), strict=True))
     limits = {}
-    if verdict.word in ("adequate", "named"):
-        with journalled(problem, WORKERS, journal) as spread:
+    with journalled(problem, WORKERS, journal) as spread:
+        sizes = sizes_of(found, verdict.standing, spread)
+        if verdict.word in ("adequate", "named"):
             limits = hidden_sizes(problem, tested.tested, fits[1], spread)
-    return Diagnosis(problem, tested, found, verdict, budget, gain, structure, limits)
+    return Diagnosis(problem, tested, found, verdict, budget, gain, structure, limits, sizes)
 
 
 def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
@@ -168,7 +172,7 @@ def _cause(diagnosis: Diagnosis, identifier: str, seed: int) -> dict[str, Any]:
     declared = {"braid_angle": setting.geometry.sd.alpha0, "dead_band": setting.pressure_bias_sd}
     for number, parameter in enumerate(effect(written).parameters(setting)):
         rng = np.random.default_rng([seed, 9, number])
-        values = parameter.prior.from_normal(fitted.draw(parameter.name, DRAWS, rng))
+        values = diagnosis.sizes.draw(parameter.name, DRAWS, rng)
         factor = si_factor(parameter.name)
         q05, q95 = np.quantile(values, [0.05, 0.95]) / factor
         parameters[parameter.name] = {

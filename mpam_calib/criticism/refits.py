@@ -21,6 +21,9 @@ Set = frozenset[str]
 Try = tuple[tuple[str, ...], dict[str, float]]
 """Forms of the effects, and coordinates to start from."""
 
+HOPELESS = 30.0
+"""Nats behind, at its word, that no doubt of a form makes up for."""
+
 
 def causes_of(found: Fit) -> Set:
     """The effects of a fit, whatever their forms."""
@@ -66,6 +69,20 @@ def with_doubted_equations(task: tuple[Fit, bool]) -> Fit:
             doubted = [with_doubt(equation) for equation in at_word if equation is not None]
             best = max([best, *doubted], key=lambda f: f.log_evidence)
     return best
+
+
+def other_forms(found: Fit) -> list[str]:
+    """All forms of a fit's effects that these do not have."""
+    return [form for e, own in named_forms(found).items() for form in forms_of(e) if form != own]
+
+
+def in_another_form(task: tuple[Fit, str]) -> Fit | None:
+    """A doubted fit with one of its effects in another form, doubted as well; None where that is hopeless."""
+    found, form = task
+    at_word = _best_with(found, [form])
+    # By a fit's first doubt, none, its equations are taken at their word.
+    plain = found.under[0].log_evidence - sum(map(price, sorted(found.effects)))
+    return None if at_word is None or at_word.log_evidence < plain - HOPELESS else with_doubt(at_word)
 
 
 def _best_with(found: Fit, forms: list[str]) -> Fit | None:

@@ -28,6 +28,7 @@ from mpam_calib.criticism.diagnose import DRAWS
 from mpam_calib.criticism.problem import build_problem
 from mpam_calib.criticism.search import search
 from mpam_calib.criticism.searched import Search
+from mpam_calib.criticism.sizes import sizes_of
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Options, draw_blueprint
@@ -64,17 +65,15 @@ class Scored:
 
 def _inside(search: Search, effects: frozenset[str], one: rig_case.Case) -> tuple[int, int]:
     """How many hidden sizes of a form that the package shares lie in their 90 % bands, and of how many."""
-    fitted = search.fits[effects, search.best_size(effects)]
-    priors = {
-        p.name: p.prior for e in fitted.effects for p in effect(e).parameters(search.problem.model.setting)
-    }
+    sizes = sizes_of(search, effects)
+    told = {p.name for e in sizes.fits[0].effects for p in effect(e).parameters(sizes.setting)}
     hits = of = 0
     for hidden in one.hidden:
         form = rig_form(hidden.id, hidden.form)
-        if not form.shared or form.parameter not in priors:
+        if not form.shared or form.parameter not in told:
             continue
-        u = fitted.draw(form.parameter, DRAWS, np.random.default_rng(one.seed))
-        low, high = np.quantile(priors[form.parameter].from_normal(u), [0.05, 0.95])
+        values = sizes.draw(form.parameter, DRAWS, np.random.default_rng(one.seed))
+        low, high = np.quantile(values, [0.05, 0.95])
         of += 1
         hits += bool(low <= hidden.size * si_factor(form.parameter) <= high)
     return hits, of

@@ -1,0 +1,56 @@
+"""Sizes of a set's causes: over every doubt, and over every form that the data do not exclude.
+
+The likeliest form alone would be too sure of a size: that of another may lie a few of its own sds away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpam_calib.criticism.fit import Fit
+from mpam_calib.criticism.refits import Set, in_another_form, other_forms
+from mpam_calib.criticism.searched import Search
+from mpam_calib.criticism.spread import Spread
+from mpam_calib.model.effect import effect
+from mpam_calib.model.state import Setting
+
+Array = NDArray[np.float64]
+
+EXCLUDED = 8.0
+"""Nats behind the likeliest form from which on another is left out."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """One set's fits in all forms that count, the likeliest first: a mixture by their evidence."""
+
+    fits: tuple[Fit, ...]
+    setting: Setting
+
+    def draw(self, name: str, count: int, rng: np.random.Generator) -> Array:
+        """Draws (count,) of one parameter, SI units, from the forms that have it."""
+        found = []
+        for fit in self.fits:
+            priors = {p.name: p.prior for e in fit.effects for p in effect(e).parameters(self.setting)}
+            if name in priors:
+                found.append((fit, priors[name]))
+        log_evidence = np.array([fit.log_evidence for fit, _ in found])
+        weights = np.exp(log_evidence - log_evidence.max())
+        counts = rng.multinomial(count, weights / weights.sum())
+        return np.concatenate(
+            [prior.from_normal(fit.draw(name, n, rng)) for (fit, prior), n in zip(found, counts, strict=True)]
+        )
+
+
+def sizes_of(found: Search, effects: Set, spread: Spread | None = None) -> Sizes:
+    """A set's fit beside the remainder that suits it, and those with one of its effects in another form."""
+    best = found.best_fit(effects)
+    tasks = [(best, form) for form in other_forms(best)]
+    others = [f for f in (spread or found.spread)(in_another_form, tasks, chunk=4) if f is not None]
+    others = [f for f in others if f.log_evidence > best.log_evidence - EXCLUDED]
+    setting = found.problem.model.setting
+    assert setting is not None
+    return Sizes((best, *sorted(others, key=lambda f: -f.log_evidence)), setting)

@@ -1,0 +1,100 @@
+"""Bands of a cause's size: over all forms that the data do not exclude, by their evidence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rig import sets
+
+from criticism.test_hypotheses import problem_of, specimen_of
+from mpam_calib.criticism.fit import Fit, Under, chain_for, fit
+from mpam_calib.criticism.forms import forms_of, price
+from mpam_calib.criticism.problem import Problem
+from mpam_calib.criticism.searched import Search
+from mpam_calib.criticism.sizes import EXCLUDED, Sizes, sizes_of
+from mpam_calib.criticism.spread import Alone
+from mpam_calib.model.effect import effect
+
+CAUSE, SIZE_NAME = "creep", "creep_per_decade"
+TESTS = 120
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
+    return problem_of(specimen_of(recipe.name))
+
+
+def force_with(problem: Problem, start: Fit, form: str, u: dict[str, float]) -> np.ndarray:
+    """The force (n,) of a fitted simulation with one effect more, its coordinates as given, N."""
+    chain, n = chain_for(problem.blueprint.model_dump_json(), frozenset([form])), len(problem)
+    at = dict(zip(start.names, start.u.tolist(), strict=True)) | u
+    values = {p.name: p.prior.from_normal(np.full((1, 1), at[p.name])) for p in chain.parameters}
+    force = chain.force(values, start.eta[None], problem.readings)[0]
+    return np.asarray(0.5 * (force[:n] + force[n:]))
+
+
+def found_for(problem: Problem) -> Sizes:
+    """The sizes of the cause as a search for nothing else ends with them."""
+    found = Search(problem, (CAUSE,), Alone(problem))
+    found.refit_all([(frozenset(), 0), (frozenset([CAUSE]), 0)])
+    found.polish([frozenset([CAUSE])])
+    found.doubt(1)
+    return sizes_of(found, frozenset([CAUSE]))
+
+
+def test_draws_weigh_the_forms_by_their_evidence(problem: Problem) -> None:
+    """Three to one for the second of two forms, the third without that parameter."""
+    assert problem.model.setting is not None
+    base = fit(problem, frozenset([CAUSE]), 0)
+    d = len(base.names)
+    near = replace(base, log_evidence=-900.0, under=(Under(-900.0, np.full(d, -1.0), np.full(d, 1e-3)),))
+    far = replace(
+        base, effects=frozenset([f"{CAUSE}:power"]), log_evidence=-900.0 + np.log(3.0),
+        under=(Under(-900.0, np.full(d, 1.0), np.full(d, 1e-3)),),
+    )  # fmt: skip
+    none = replace(fit(problem, frozenset(), 0), log_evidence=-800.0)
+    draws = Sizes((far, near, none), problem.model.setting).draw(SIZE_NAME, 4000, np.random.default_rng(3))
+    (parameter,) = effect(CAUSE).parameters(problem.model.setting)
+    low, middle, high = parameter.prior.from_normal(np.array([-1.0, 0.0, 1.0]))
+    assert len(draws) == 4000
+    assert np.mean(draws > middle) == pytest.approx(0.75, abs=0.02)
+    assert draws.min() == pytest.approx(low, rel=0.02) and draws.max() == pytest.approx(high, rel=0.02)
+
+
+@pytest.mark.parametrize(("size", "alone"), [(0.05, False), (2.0, True)])
+def test_forms_that_the_data_exclude_are_left_out(problem: Problem, size: float, alone: bool) -> None:
+    """A small creep may follow any law of time, a large one its own."""
+    made = problem.with_force(force_with(problem, fit(problem, frozenset(), 0), CAUSE, {SIZE_NAME: size}))
+    sizes = found_for(made)
+    first, *others = sizes.fits
+    assert first.effects == {CAUSE}
+    assert bool(others) != alone
+    evidence = [f.log_evidence for f in others]
+    assert all(first.log_evidence >= e > first.log_evidence - EXCLUDED for e in evidence)
+    assert evidence == sorted(evidence, reverse=True)
+
+
+@pytest.mark.long
+def test_the_band_of_a_size_covers_whatever_form_was_due(problem: Problem) -> None:
+    """Forms drawn as the prior has them, hard to tell apart: the likeliest form by itself is too sure."""
+    assert problem.model.setting is not None
+    start, rng = fit(problem, frozenset(), 0), np.random.default_rng(3)
+    forms = forms_of(CAUSE)
+    shares = np.exp([-price(form) for form in forms])
+    inside = np.zeros(2, dtype=int)
+    for _ in range(TESTS):
+        form = forms[rng.choice(len(forms), p=shares / shares.sum())]
+        own = effect(form).parameters(problem.model.setting)
+        u = {p.name: rng.standard_normal() for p in own} | {SIZE_NAME: 0.3}
+        noise = rng.multivariate_normal(np.zeros(len(problem)), problem.covariance(0.0), method="cholesky")
+        sizes = found_for(problem.with_force(force_with(problem, start, form, u) + noise))
+        target = own[0].prior.from_normal(np.array([0.3]))[0]
+        for i, kept in enumerate((sizes, replace(sizes, fits=sizes.fits[:1]))):
+            low, high = np.quantile(kept.draw(SIZE_NAME, 4000, rng), [0.05, 0.95])
+            inside[i] += low <= target <= high
+    print(f"inside {inside[0]} of {TESTS}, by the likeliest form alone {inside[1]}")
+    assert inside[0] / TESTS > 0.9 - 3.0 * np.sqrt(0.9 * 0.1 / TESTS)
+    assert inside[1] < inside[0]
