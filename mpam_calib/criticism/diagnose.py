@@ -186,6 +186,9 @@ def _cause(diagnosis: Diagnosis, identifier: str, seed: int) -> dict[str, Any]:
     return {
         "id": identifier,
         "form": written.partition(":")[2],
+        "forms": [
+            {"form": f, "probability": _round(p)} for f, p in diagnosis.sizes.forms(identifier).items()
+        ],
         "probability": _round(verdict.marginals[identifier]),
         "parameters": parameters,
         "share_of_misfit": _round(diagnosis.budget.shares[identifier]),

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from mpam_calib.criticism.fit import Fit
-from mpam_calib.criticism.refits import Set, in_another_form, other_forms
+from mpam_calib.criticism.refits import Set, in_another_form, named_forms, other_forms
 from mpam_calib.criticism.searched import Search
 from mpam_calib.criticism.spread import Spread
 from mpam_calib.model.effect import effect
@@ -30,19 +31,31 @@ class Sizes:
     fits: tuple[Fit, ...]
     setting: Setting
 
+    @property
+    def weights(self) -> Array:
+        """Probability of each fit (fits,)."""
+        return np.asarray(special.softmax([fit.log_evidence for fit in self.fits]))
+
+    def forms(self, identifier: str) -> dict[str, float]:
+        """The forms of one cause (of which none is "") with their probabilities, the likeliest first."""
+        found: dict[str, float] = {}
+        for fit, weight in zip(self.fits, self.weights.tolist(), strict=True):
+            form = named_forms(fit)[identifier].partition(":")[2]
+            found[form] = found.get(form, 0.0) + weight
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
+
     def draw(self, name: str, count: int, rng: np.random.Generator) -> Array:
         """Draws (count,) of one parameter, SI units, from the forms that have it."""
-        found = []
-        for fit in self.fits:
-            priors = {p.name: p.prior for e in fit.effects for p in effect(e).parameters(self.setting)}
-            if name in priors:
-                found.append((fit, priors[name]))
-        log_evidence = np.array([fit.log_evidence for fit, _ in found])
-        weights = np.exp(log_evidence - log_evidence.max())
-        counts = rng.multinomial(count, weights / weights.sum())
-        return np.concatenate(
-            [prior.from_normal(fit.draw(name, n, rng)) for (fit, prior), n in zip(found, counts, strict=True)]
-        )
+        having, priors, weights = [], [], []
+        for fit, weight in zip(self.fits, self.weights, strict=True):
+            own = {p.name: p.prior for e in fit.effects for p in effect(e).parameters(self.setting)}
+            if name in own:
+                having.append(fit)
+                priors.append(own[name])
+                weights.append(weight)
+        counts = rng.multinomial(count, np.array(weights) / sum(weights))
+        drawn = [fit.draw(name, n, rng) for fit, n in zip(having, counts, strict=True)]
+        return np.concatenate([prior.from_normal(u) for prior, u in zip(priors, drawn, strict=True)])
 
 
 def sizes_of(found: Search, effects: Set, spread: Spread | None = None) -> Sizes:

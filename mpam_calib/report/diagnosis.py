@@ -48,6 +48,9 @@ SENTENCES = {
 COVERED = 0.75
 """Share of left-out readings below which 90 % bands are too narrow to go by."""
 
+SETTLED = 0.95
+"""Probability above which a cause's equation is not said to be open."""
+
 NO_SIZE = {"mean": np.nan, "q05": np.nan, "q95": np.nan}
 
 FORMS = (
@@ -233,6 +236,11 @@ def _causes(causes: list[dict[str, Any]], parameters: dict[str, Parameter]) -> l
     formats |= dict.fromkeys(["probability", "share of misfit"], "{}")
     bent = any(is_bend(name) for c in causes for name in c["parameters"])
     text = f"{FORMS} {BENT}" if bent else FORMS
+    undecided = [effect(c["id"]).title.lower() for c in causes if c["forms"][0]["probability"] < SETTLED]
+    if undecided:
+        text += (
+            f" The data leave other equations open for: {', '.join(undecided)}. The bands allow for these."
+        )
     return [Text(text), DataTable(pd.DataFrame(rows), "Causes with their sizes (90 % bands)", formats)]
 
 

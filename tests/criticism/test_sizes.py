@@ -60,6 +60,7 @@ def test_draws_weigh_the_forms_by_their_evidence(problem: Problem) -> None:
     (parameter,) = effect(CAUSE).parameters(problem.model.setting)
     low, middle, high = parameter.prior.from_normal(np.array([-1.0, 0.0, 1.0]))
     assert len(draws) == 4000
+    assert Sizes((far, near), problem.model.setting).forms(CAUSE) == pytest.approx({"power": 0.75, "": 0.25})
     assert np.mean(draws > middle) == pytest.approx(0.75, abs=0.02)
     assert draws.min() == pytest.approx(low, rel=0.02) and draws.max() == pytest.approx(high, rel=0.02)
 
