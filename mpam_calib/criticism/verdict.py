@@ -96,8 +96,7 @@ def judge(found: Search) -> Verdict:
         standing = _standing(found, leading)
         if gives_way:
             standing &= rival.beside
-        if not _lessens(found, standing):
-            standing = frozenset()
+        standing = _outweighing(found, standing)
         held = Verdict("unexplained", leading, standing, probabilities, marginals, size, faults, trace=trace)
         return replace(held, load_cell=rival.lead, cell_fault=rival.fault) if gives_way else held
     if nothing:
@@ -144,10 +143,22 @@ def _lessens(found: Search, effects: Set) -> bool:
 
     A cause of a huge size would otherwise be a licence to doubt it.
     """
-    problem = found.problem
-    fitted = found.refit(effects, 0)
-    after = structured(problem, by_equations(problem, fitted))
-    return after <= structured(problem, found.refit(frozenset(), 0).force)
+    return _left(found, effects) <= _left(found, frozenset())
+
+
+def _outweighing(found: Search, effects: Set) -> Set:
+    """Those of the causes without which the misfit is more than twice as large (mean squares).
+
+    What explains less than is left beside all causes is no name to go by: it may stand in for the rest.
+    """
+    left = _left(found, effects)
+    kept = frozenset(e for e in effects if _left(found, effects - {e}) > 2.0 * left)
+    return kept if kept == effects else _outweighing(found, kept)
+
+
+def _left(found: Search, effects: Set) -> float:
+    """Mean square (N²) of the misfit that the causes' equations leave."""
+    return structured(found.problem, by_equations(found.problem, found.refit(effects, 0)))
 
 
 def _standing(found: Search, leading: Set) -> Set:

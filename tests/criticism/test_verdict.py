@@ -76,13 +76,14 @@ def test_a_set_whose_residuals_still_depend_on_something_is_not_named(
         assert verdict.trace.size > 0.3 * problem.noise_level.total
 
 
-def search_beside_a_remainder(problem: Problem, margin: float, misfit: float) -> Search:
+def search_beside_a_remainder(problem: Problem, margin: float, misfit: float, left: float = 0.5) -> Search:
     """A search whose cause needs the largest remainder and leads by a margin (nats) beside it.
 
-    ``misfit`` is what the fits leave even so, whitened squares per row.
+    ``misfit`` is what the fits leave even so, whitened squares per row, ``left`` the share of the force's
+    misfit that the cause leaves.
     """
     largest = len(SIZES) - 1
-    found = search_where_the_cause_leaves(problem, 0.9)
+    found = search_where_the_cause_leaves(problem, left)
     for (effects, size), fitted in list(found.fits.items()):
         evidence = -100.0 * (size < largest) + (margin - found.log_prior(CAUSE)) * (effects == CAUSE)
         found.fits[effects, size] = replace(fitted, log_evidence=evidence, chi2=misfit * len(problem))
@@ -110,6 +111,16 @@ def test_nor_does_it_stand_where_free_strokes_replace_it(
 ) -> None:
     found = search_beside_a_remainder(problem, 90.0, 1.0)
     monkeypatch.setattr(verdict_module, "score_beside", scores_of({CAUSE: margin}))
+    assert judge(found).standing == (CAUSE if stands else NOTHING)
+
+
+@pytest.mark.parametrize(("left", "stands"), [(0.5, True), (0.65, True), (0.85, False), (0.95, False)])
+def test_nor_does_it_stand_where_it_explains_less_than_is_left(
+    problem: Problem, left: float, stands: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By mean squares beyond the noise: at most half of them may be left."""
+    found = search_beside_a_remainder(problem, 90.0, 1.0, left)
+    monkeypatch.setattr(verdict_module, "score_beside", scores_of({CAUSE: 90.0}))
     assert judge(found).standing == (CAUSE if stands else NOTHING)
 
 
