@@ -18,7 +18,9 @@ def simulate(
     more: Annotated[
         list[str] | None, typer.Argument(metavar="ID", help="further effects, after --hide")
     ] = None,
-    hide: Annotated[list[str] | None, typer.Option(help="ID or ID=VALUE of an effect to hide")] = None,
+    hide: Annotated[
+        list[str] | None, typer.Option(help="ID, ID:FORM or ID=VALUE of an effect to hide")
+    ] = None,
     seed: Annotated[int, typer.Option(help="seed of the noise", min=0)] = 0,
 ) -> None:
     """Write a specimen folder with synthetic recordings of the declared simulation."""
@@ -46,8 +48,9 @@ def _sizes(hide: list[str]) -> dict[str, float | None]:
     sizes: dict[str, float | None] = {}
     for text in hide:
         identifier, equals, number = text.partition("=")
-        if identifier in sizes:
-            raise InputError("--hide", f"{identifier} twice", "each effect once")
+        base = identifier.partition(":")[0]
+        if any(base == known.partition(":")[0] for known in sizes):
+            raise InputError("--hide", f"{base} twice", "each effect once")
         try:
             sizes[identifier] = float(number) if equals else None
         except ValueError as error:

@@ -50,9 +50,10 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
     """Synthetic recordings of a specimen.
 
     With data: the mode fitted to them, at their rows. Without: the declared ``E_Pa`` and the thesis's
-    protocol. ``hide`` maps effect ids to a size in lab units (None: a typical one). Raises
-    ``InputError`` for an id that is unknown, is part of the simulation, has no size to hide, or lacks what it
-    needs, and for a size that its prior all but rules out.
+    protocol. ``hide`` maps effects (``id``, or ``id:form`` for another author's equation, whose own
+    parameters are typical) to a size in lab units (None: a typical one). Raises ``InputError`` for one that
+    is unknown, is part of the simulation, has no size to hide, or lacks what it needs, and for a size that
+    its prior all but rules out.
     """
     rng = np.random.default_rng([seed, 8])
     fitted = specimen.has_muscle_data
@@ -122,39 +123,46 @@ def _with_hidden(
     """The model with the hidden effects, their sizes put among the values."""
     place = "--hide"
     hidden: dict[str, dict[str, float]] = {}
-    for identifier, size in hide.items():
+    for declared, size in hide.items():
+        identifier, _, form = declared.partition(":")
         if identifier not in known_effects():
             raise InputError(place, f'"{identifier}"', "one of " + ", ".join(known_effects()))
-        item = effect(identifier)
+        forms = effect(identifier).forms
+        if declared != identifier and form not in forms:
+            known = "one of " + ", ".join(f"{identifier}:{f}" for f in forms) if forms else identifier
+            raise InputError(place, f'"{declared}"', known)
+        item = effect(declared)
         if item.needs_braid and specimen.braid is None:
             raise InputError(place, f"{identifier} without [braid]", "the strands' values in specimen.toml")
         simulation = blueprint.simulation
         if identifier in simulation.effect_ids or identifier in simulation.effects_within:
             raise InputError(place, f'"{identifier}"', "an effect that the simulation does not have")
-        extended = simulation.model_copy(update={"effects": (*simulation.effects, identifier)})
+        extended = simulation.model_copy(update={"effects": (*simulation.effects, declared)})
         blueprint = blueprint.model_copy(update={"simulation": extended})
         setting = blueprint.setting()
         assert setting is not None
         parameters = item.parameters(setting)
-        if size is not None and len(parameters) != 1:
-            raise InputError(place, f"{identifier}={size:g}", f"no value: {identifier} has no single size")
-        hidden[identifier] = {}
+        shared = {p.name for p in effect(identifier).parameters(setting)}
+        sizes = [p.name for p in parameters if p.name in shared]
+        if size is not None and len(sizes) != 1:
+            raise InputError(place, f"{declared}={size:g}", f"no value: {declared} has no single size")
+        hidden[declared] = {}
         for parameter in parameters:
             factor = si_factor(parameter.name)
             smallest, typical, largest = (
                 float(parameter.prior.from_normal(np.array(z))) for z in (-FARTHEST, TYPICAL, FARTHEST)
             )
-            value = typical if size is None else size * factor
+            value = typical if size is None or parameter.name not in sizes else size * factor
             if not smallest <= value <= largest:
                 bounds = f"between {smallest / factor:.3g} and {largest / factor:.3g}"
                 expected = f"{bounds} {parameter.printed_unit}".strip()
-                raise InputError(place, f"{identifier}={size:g}", expected)
+                raise InputError(place, f"{declared}={size:g}", expected)
             if parameter.name in values:
                 raise InputError(place, f'"{identifier}"', f"an effect without the declared {parameter.name}")
             values[parameter.name] = np.full((1, 1), value)
-            hidden[identifier][parameter.name] = value / factor
+            hidden[declared][parameter.name] = value / factor
     rubs = blueprint.simulation.friction != "none" or FRICTIONS & set(blueprint.simulation.effect_ids)
-    for identifier in sorted(OF_FRICTION & hidden.keys()):
+    for identifier in sorted(OF_FRICTION & {declared.partition(":")[0] for declared in hidden}):
         if not rubs:
             raise InputError(place, f"{identifier} without friction", "a friction that it can change")
     return build_model(blueprint), hidden

@@ -9,6 +9,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mpam_calib.posterior.material import material_of
@@ -38,6 +39,37 @@ def test_a_size_that_a_rig_may_have_is_hidden_and_told(muscle: Path, tmp_path: P
     assert here("simulate", muscle, "-o", tmp_path / "made", "--hide", "dead_band=7.5").code == 0
     truth = json.loads((tmp_path / "made" / "truth.json").read_text())
     assert truth["hidden"]["dead_band"] == {"P_DB_kPa": 7.5}
+
+
+def test_an_effect_may_be_hidden_in_another_form(muscle: Path, tmp_path: Path, here: Here) -> None:
+    """Relaxation by a power of time: its size is the effect's, its power a typical one."""
+    assert here("simulate", muscle, "-o", tmp_path / "made", "--hide", "creep:power=0.02").code == 0
+    assert here("simulate", muscle, "-o", tmp_path / "plain", "--hide", "creep=0.02").code == 0
+    truth = json.loads((tmp_path / "made" / "truth.json").read_text())
+    hidden = truth["hidden"]["creep:power"]
+    assert set(hidden) == {"creep_per_decade", "creep_exponent", "creep_before_s"}
+    assert hidden["creep_per_decade"] == 0.02
+    made, plain = (read(tmp_path / name).loops for name in ("made", "plain"))
+    assert made is not None and plain is not None
+    assert np.abs(made.force_N - plain.force_N).max() > 0.0
+    assert here("check", tmp_path / "made").code == 0
+
+
+@pytest.mark.parametrize(
+    ("hide", "complaint"),
+    [
+        ("creep:none", 'found "creep:none", expected one of creep:wall, creep:early, creep:power,'),
+        ("creep:bent", 'found "creep:bent", expected one of creep:wall,'),
+        ("creep:", 'found "creep:", expected one of creep:wall,'),
+    ],
+)
+def test_a_form_that_has_no_equation_is_refused(
+    hide: str, complaint: str, muscle: Path, tmp_path: Path, here: Here
+) -> None:
+    result = here("simulate", muscle, "-o", tmp_path / "made", "--hide", hide)
+    assert result.code == 2
+    assert result.complaint.startswith(f"error: --hide: {complaint}")
+    assert not (tmp_path / "made").exists()
 
 
 def test_several_effects_may_follow_one_hide(muscle: Path, tmp_path: Path, here: Here) -> None:
@@ -77,7 +109,7 @@ def test_no_friction_cannot_be_changed(effect: str, tmp_path: Path, here: Here) 
 
 
 def test_an_effect_is_hidden_once(muscle: Path, tmp_path: Path, here: Here) -> None:
-    twice = ("--hide", "dead_band=7.5", "--hide", "dead_band")
+    twice = ("--hide", "dead_band=7.5", "--hide", "dead_band:soft")
     result = here("simulate", muscle, "-o", tmp_path / "made", *twice)
     assert result.code == 2
     assert result.complaint == "error: --hide: found dead_band twice, expected each effect once"
