@@ -26,7 +26,7 @@ EXCLUDED = 8.0
 
 @dataclass(frozen=True)
 class Sizes:
-    """One set's fits in all forms that count, the likeliest first: a mixture by their evidence."""
+    """One set's fits in all forms that count, the search's own first: a mixture by their evidence."""
 
     fits: tuple[Fit, ...]
     setting: Setting
@@ -66,4 +66,4 @@ def sizes_of(found: Search, effects: Set, spread: Spread | None = None) -> Sizes
     others = [f for f in others if f.log_evidence > best.log_evidence - EXCLUDED]
     setting = found.problem.model.setting
     assert setting is not None
-    return Sizes((best, *sorted(others, key=lambda f: -f.log_evidence)), setting)
+    return Sizes((best, *others), setting)

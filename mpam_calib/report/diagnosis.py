@@ -236,7 +236,11 @@ def _causes(causes: list[dict[str, Any]], parameters: dict[str, Parameter]) -> l
     formats |= dict.fromkeys(["probability", "share of misfit"], "{}")
     bent = any(is_bend(name) for c in causes for name in c["parameters"])
     text = f"{FORMS} {BENT}" if bent else FORMS
-    undecided = [effect(c["id"]).title.lower() for c in causes if c["forms"][0]["probability"] < SETTLED]
+    undecided = [
+        effect(c["id"]).title.lower()
+        for c in causes
+        if any(f["form"] == c["form"] and f["probability"] < SETTLED for f in c["forms"])
+    ]
     if undecided:
         text += (
             f" The data leave other equations open for: {', '.join(undecided)}. The bands allow for these."

@@ -63,6 +63,7 @@ def test_a_cause_states_its_probability_once_and_warns_of_bends(form: str) -> No
     parameters = {p.name: p for p in effect(f"creep:{form}".strip(":")).parameters(setting)}
     sizes = {name: {"mean": 0.1, "sd": 0.01, "q05": 0.08, "q95": 0.12} for name in parameters}
     cause = {"id": "creep", "form": form, "probability": 0.98, "share_of_misfit": 0.7, "parameters": sizes}
+    cause["forms"] = [{"form": form, "probability": 1.0}]
     text, table = _causes([cause], parameters)
     assert isinstance(text, Text)
     assert isinstance(table, DataTable)
@@ -70,3 +71,14 @@ def test_a_cause_states_its_probability_once_and_warns_of_bends(form: str) -> No
     assert len(table.rows) == len(parameters) > (form == "bent")
     once = [(row[2], row[-1]) for row in table.rows]
     assert once == [("0.98", "0.7"), *[("", "")] * (len(parameters) - 1)]
+
+
+@pytest.mark.parametrize(("probability", "open_"), [(0.97, False), (0.6, True)])
+def test_a_cause_whose_equation_is_open_is_told(probability: float, open_: bool) -> None:
+    """By the form that the simulation is extended by, whichever is the likeliest."""
+    forms = [{"form": "", "probability": 1.0 - probability}, {"form": "power", "probability": probability}]
+    cause = {"id": "creep", "form": "power", "forms": forms, "probability": 0.98, "share_of_misfit": 0.7}
+    cause["parameters"] = {}
+    text, _ = _causes([cause], {})
+    assert isinstance(text, Text)
+    assert ("other equations open for: creep." in text.html) == open_
