@@ -74,7 +74,7 @@ def test_forms_that_the_data_exclude_are_left_out(problem: Problem, size: float,
     assert first.effects == {CAUSE}
     assert bool(others) != alone
     assert all(f.log_evidence > first.log_evidence - EXCLUDED for f in others)
-    assert max(forms := sizes.forms(CAUSE), key=forms.__getitem__) == ""
+    assert next(iter(sizes.forms(CAUSE))) == ""
 
 
 @pytest.mark.long
