@@ -57,8 +57,7 @@ class Diagnosis:
     @property
     def declared_forms(self) -> tuple[str, ...]:
         """The causes as a simulation declares them (with their forms)."""
-        chosen = self.search.fits[self.verdict.standing, self.search.best_size(self.verdict.standing)].effects
-        return tuple(sorted(chosen))
+        return tuple(sorted(self.sizes.fits[0].effects))
 
 
 def diagnose(
@@ -162,17 +161,15 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
 
 def _cause(diagnosis: Diagnosis, identifier: str, seed: int) -> dict[str, Any]:
     """One cause: its probability, parameters (lab units), share and whether it was to be expected."""
-    found, verdict = diagnosis.search, diagnosis.verdict
-    fitted = found.fits[verdict.standing, found.best_size(verdict.standing)]
-    setting = diagnosis.problem.model.setting
-    assert setting is not None
-    written = next(e for e in fitted.effects if e.partition(":")[0] == identifier)
+    verdict, sizes = diagnosis.verdict, diagnosis.sizes
+    setting = sizes.setting
+    written = next(e for e in sizes.fits[0].effects if e.partition(":")[0] == identifier)
     parameters: dict[str, dict[str, float]] = {}
     within = False
     declared = {"braid_angle": setting.geometry.sd.alpha0, "dead_band": setting.pressure_bias_sd}
     for number, parameter in enumerate(effect(written).parameters(setting)):
         rng = np.random.default_rng([seed, 9, number])
-        values = diagnosis.sizes.draw(parameter.name, DRAWS, rng)
+        values = sizes.draw(parameter.name, DRAWS, rng)
         factor = si_factor(parameter.name)
         q05, q95 = np.quantile(values, [0.05, 0.95]) / factor
         parameters[parameter.name] = {
@@ -186,9 +183,7 @@ def _cause(diagnosis: Diagnosis, identifier: str, seed: int) -> dict[str, Any]:
     return {
         "id": identifier,
         "form": written.partition(":")[2],
-        "forms": [
-            {"form": f, "probability": _round(p)} for f, p in diagnosis.sizes.forms(identifier).items()
-        ],
+        "forms": [{"form": f, "probability": _round(p)} for f, p in sizes.forms(identifier).items()],
         "probability": _round(verdict.marginals[identifier]),
         "parameters": parameters,
         "share_of_misfit": _round(diagnosis.budget.shares[identifier]),
