@@ -41,23 +41,21 @@ class Journal:
     def over(self, spread: Spread) -> Spread:
         """A spread that reads what the journal has, does the rest and writes it down."""
 
-        def kept(function: Callable[[T], R], tasks: Iterable[T], chunk: int = 1) -> Iterator[R]:
+        def kept(function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
             self.calls += 1
             name = getattr(function, "__name__", "results").strip("_")
-            return self._results(f"{self.calls:04d}_{name}", spread, function, list(tasks), chunk)
+            return self._results(f"{self.calls:04d}_{name}", spread, function, list(tasks))
 
         return kept
 
-    def _results(
-        self, name: str, spread: Spread, function: Callable[[T], R], tasks: list[T], chunk: int
-    ) -> Iterator[R]:
+    def _results(self, name: str, spread: Spread, function: Callable[[T], R], tasks: list[T]) -> Iterator[R]:
         done = 0
         while (part := self.checkpoint.load(f"{name}_{done:06d}")) is not None:
             done += len(part)
             yield from part
         pending: list[R] = []
         saved = time.monotonic()
-        for result in spread(function, tasks[done:], chunk):
+        for result in spread(function, tasks[done:]):
             pending.append(result)
             yield result
             if time.monotonic() - saved > EVERY:

@@ -88,7 +88,7 @@ def rank_spread(
     """:func:`rank` by workers that hold the problem; ``always`` names models that are integrated anyhow."""
     groups = _by_law(space)
     plain: list[dict[str, Ranked | None]] = []
-    for number, found in enumerate(spread(_fit_plain, groups, 4)):
+    for number, found in enumerate(spread(_fit_plain, groups)):
         plain.append(found)
         tell("ranking", (number + 1) / len(groups) / 2)
     ranked = [r for found in plain for r in found.values() if r is not None]

@@ -95,7 +95,7 @@ class Search:
         """Refit many sets, each beside a remainder of one size; those that no climb can fit are left out."""
         todo = [key for key in dict.fromkeys(keys) if key not in self.fits]
         tasks = [(size, self._tries(effects, size), self.doubting) for effects, size in todo]
-        for key, found in zip(todo, self.spread(best_of, tasks, chunk=4), strict=True):
+        for key, found in zip(todo, self.spread(best_of, tasks), strict=True):
             if found is not None:
                 self.fits[key] = found
 
@@ -188,7 +188,7 @@ class Search:
         ]
         tries = [[(tuple(sorted(leads[s].effects)), ended(leads[s]))] for s, _ in keys]
         tasks = [(size, each, self.doubting) for (_, size), each in zip(keys, tries, strict=True)]
-        for key, fit in zip(keys, self.spread(best_of, tasks, chunk=4), strict=True):
+        for key, fit in zip(keys, self.spread(best_of, tasks), strict=True):
             if fit is not None and fit.log_evidence > self.fits[key].log_evidence:
                 self.fits[key] = fit
 
@@ -201,7 +201,7 @@ class Search:
             for new in (e for e in self.tested if e not in effects):
                 tries = [(tuple((kept | {new: form}).values()), ended(found)) for form in flexible(new)]
                 tasks[frozenset([*kept, new]), 0] = (0, tries, self.doubting)
-        for key, fit in zip(tasks, self.spread(best_of, tasks.values(), chunk=4), strict=True):
+        for key, fit in zip(tasks, self.spread(best_of, tasks.values()), strict=True):
             if fit is not None and (key not in self.fits or fit.log_evidence > self.fits[key].log_evidence):
                 self.fits[key] = fit
                 self.polished.pop(key, None)
@@ -233,7 +233,7 @@ class Search:
         tasks = [(self.fits[key], key[0] in sets[:LEADERS]) for key in best]
         doubted = [
             *self.spread(with_doubted_equations, tasks),
-            *self.spread(with_doubt, [self.fits[key] for key in rest], chunk=2),
+            *self.spread(with_doubt, [self.fits[key] for key in rest]),
         ]
         # A doubt has its price in evidence: who does not pay it cannot be compared with those who do.
         self.searched, self.fits = self.fits, dict(zip([*best, *rest], doubted, strict=True))
@@ -251,7 +251,7 @@ class Search:
         keys = [key for key in self.fits if key[0] in kept]
         fits = (self.fits[key] for key in keys)
         tasks = [(f.size, [(tuple(sorted(f.effects)), ended(f))], False) for f in fits]
-        for key, found in zip(keys, spread(best_of, tasks, chunk=4), strict=True):
+        for key, found in zip(keys, spread(best_of, tasks), strict=True):
             if found is not None:
                 made.fits[key] = found
         return made

@@ -62,7 +62,7 @@ def sizes_of(found: Search, effects: Set, spread: Spread | None = None) -> Sizes
     """A set's fit beside the remainder that suits it, and those with one of its effects in another form."""
     best = found.best_fit(effects)
     tasks = [(best, form) for form in other_forms(best)]
-    others = [f for f in (spread or found.spread)(in_another_form, tasks, chunk=4) if f is not None]
+    others = [f for f in (spread or found.spread)(in_another_form, tasks) if f is not None]
     others = [f for f in others if f.log_evidence > best.log_evidence - EXCLUDED]
     setting = found.problem.model.setting
     assert setting is not None

@@ -23,8 +23,8 @@ _PROBLEM: Problem | None = None
 class Spread(Protocol):
     """``map`` whose functions find the problem with :func:`held_problem`; results in the tasks' order."""
 
-    def __call__(self, function: Callable[[T], R], tasks: Iterable[T], chunk: int = 1) -> Iterator[R]:
-        """Apply ``function`` to every task, ``chunk`` of them at a time to one worker."""
+    def __call__(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
+        """Apply ``function`` to every task."""
 
 
 @contextmanager
@@ -40,7 +40,7 @@ def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
         before = _PROBLEM
         _hold(problem)
         try:
-            yield lambda function, tasks, chunk=1: map(function, tasks)
+            yield lambda function, tasks: map(function, tasks)
         finally:
             _hold(before)
         return
@@ -48,7 +48,7 @@ def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
         with ProcessPoolExecutor(
             workers, mp_context=get_context(start_method()), initializer=_begin, initargs=(problem,)
         ) as pool:
-            yield lambda function, tasks, chunk=1: pool.map(function, tasks, chunksize=chunk)
+            yield lambda function, tasks: pool.map(function, tasks)
     except BrokenProcessPool as error:
         raise Interrupted("interrupted: a worker process was killed (for want of memory?)") from error
 
@@ -59,7 +59,7 @@ class Alone:
 
     problem: Problem
 
-    def __call__(self, function: Callable[[T], R], tasks: Iterable[T], chunk: int = 1) -> Iterator[R]:
+    def __call__(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
         """One task after another."""
         with spread_over(self.problem, 1) as spread:
             yield from spread(function, tasks)
