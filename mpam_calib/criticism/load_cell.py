@@ -59,7 +59,7 @@ def _rival(found: Search, leading: Set, fault: str) -> Rival:
     if not scores:
         return NO_RIVAL
     best = max(scores, key=lambda s: scores[s])
-    return Rival(scores[best] - found.score(leading), best, fault)
+    return Rival(scores[best] - found.score_of_best(leading), best, fault)
 
 
 def _tries(found: Search, beside: Set, size: int, fault: str) -> list[Try]:

@@ -1,7 +1,8 @@
 """Searching sets of effects: linearised scores order the search, exact refits decide it.
 
 Then the best set says how small the noise is (:mod:`mpam_calib.criticism.noise_scale`), and in the end the
-leading sets are refitted with a doubt about their forms (:mod:`mpam_calib.criticism.doubt`).
+leading sets are refitted with a doubt about their forms (:mod:`mpam_calib.criticism.doubt`), and the first
+of them in all their forms.
 """
 
 from __future__ import annotations
@@ -133,3 +134,4 @@ def _finish(found: Search, width: int, tell: Callable[[float], None]) -> None:
         (further, size) for further in found.with_one_more(first) for size in {0, found.best_size(first)}
     )
     found.doubt(DOUBTED * width)
+    found.over_forms()

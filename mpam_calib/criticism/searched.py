@@ -20,8 +20,11 @@ from mpam_calib.criticism.refits import (
     Set,
     Try,
     best_of,
+    causes_of,
     ended,
+    in_another_form,
     named_forms,
+    other_forms,
     with_better_forms,
     with_better_kinds,
     with_doubt,
@@ -45,6 +48,10 @@ LEADERS = 5
 """Sets whose parts and forms are looked at once more."""
 DOUBTED_EACH = 4
 """Best sets of every number of effects that are doubted in the end."""
+IN_ALL_FORMS, CLOSE = 10, 12.0
+"""So many leading sets, and nats behind the best, of which all forms have their say in the end."""
+TURNS = 2
+"""Times that the forms are gone through, where the likeliest was another one."""
 STARTS = (0.8, -0.8)
 """Further starts (prior sds) for a single effect: the force is curved in some of them."""
 
@@ -63,6 +70,8 @@ class Search:
     """Whether a fit also doubts the forms of its effects: only the leading sets are worth that."""
     searched: dict[tuple[Set, int], Fit] = field(default_factory=dict)
     """All that was refitted before the doubt."""
+    in_forms: dict[Set, tuple[Fit, ...]] = field(default_factory=dict)
+    """Of the leading sets the doubted fit, and those with one of its effects in another form."""
     seen: frozenset[Set] = frozenset()
     """Sets that were refitted before the noise was settled."""
 
@@ -230,14 +239,35 @@ class Search:
         keys = [key for key in self.fits if key[0] in chosen]
         rest = [key for key in keys if key[1] != self.best_size(key[0])]
         best = [key for key in keys if key[1] == self.best_size(key[0])]
-        tasks = [(self.fits[key], key[0] in sets[:LEADERS]) for key in best]
         doubted = [
-            *self.spread(with_doubted_equations, tasks),
+            *self.spread(with_doubted_equations, [self.fits[key] for key in best]),
             *self.spread(with_doubt, [self.fits[key] for key in rest]),
         ]
         # A doubt has its price in evidence: who does not pay it cannot be compared with those who do.
         self.searched, self.fits = self.fits, dict(zip([*best, *rest], doubted, strict=True))
         self.doubting = True
+
+    def over_forms(self) -> None:
+        """Give the sets that may lead the evidence of all their forms.
+
+        The likeliest alone says too little for a cause that many equations describe.
+        """
+        least = self.score(self.sets[0]) - CLOSE
+        self.refit_in_forms([s for s in self.sets if self.score(s) > least][:IN_ALL_FORMS])
+
+    def refit_in_forms(self, sets: Iterable[Set], spread: Spread | None = None) -> None:
+        """Refit sets with one of their effects in another form, doubted; from the likeliest once more."""
+        bases = {s: self.best_fit(s) for s in sets if s not in self.in_forms}
+        for _turn in range(TURNS):
+            tasks = [(base, form) for base in bases.values() for form in other_forms(base)]
+            found = {s: [base] for s, base in bases.items()}
+            for (base, _), fit in zip(tasks, (spread or self.spread)(in_another_form, tasks), strict=True):
+                if fit is not None:
+                    found[causes_of(base)].append(fit)
+            self.in_forms |= {s: tuple(fits) for s, fits in found.items()}
+            likeliest = {s: max(fits, key=lambda f: f.log_evidence) for s, fits in found.items()}
+            self.fits |= {(s, best.size): best for s, best in likeliest.items()}
+            bases = {s: best for s, best in likeliest.items() if best is not bases[s]}
 
     def with_one_more(self, effects: Set) -> list[Set]:
         """The set with each further effect, as far as sets go."""
@@ -262,7 +292,24 @@ class Search:
         return k * log(RATE) - log(comb(n, k))
 
     def score(self, effects: Set) -> float:
-        """Log posterior of a set (up to a constant), summed over the sizes that were refitted."""
+        """Log posterior of a set (up to a constant), summed over the forms that were refitted."""
+        return self.score_of_best(effects) + self._other_forms(effects)
+
+    def _other_forms(self, effects: Set) -> float:
+        """Nats that a set's other forms add to its evidence; those of each effect by themselves."""
+        if effects not in self.in_forms:
+            return 0.0
+        base, *others = self.in_forms[effects]
+        own = named_forms(base)
+        terms = {e: [0.0] for e in own}
+        for other in others:
+            (e,) = (e for e, form in named_forms(other).items() if form != own[e])
+            terms[e].append(other.log_evidence - base.log_evidence)
+        every = sum(float(np.logaddexp.reduce(t)) for t in terms.values())
+        return every + base.log_evidence - self.fits[effects, base.size].log_evidence
+
+    def score_of_best(self, effects: Set) -> float:
+        """The same for the likeliest forms alone, summed over the sizes that were refitted."""
         terms = [
             self.fits[effects, size].log_evidence + log(SIZE_PRIOR[size])
             for size in range(len(SIZES))

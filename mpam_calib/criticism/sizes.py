@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from mpam_calib.criticism.fit import Fit
-from mpam_calib.criticism.refits import Set, in_another_form, named_forms, other_forms
+from mpam_calib.criticism.refits import Set, named_forms
 from mpam_calib.criticism.searched import Search
 from mpam_calib.criticism.spread import Spread
 from mpam_calib.model.effect import effect
@@ -26,7 +26,7 @@ EXCLUDED = 8.0
 
 @dataclass(frozen=True)
 class Sizes:
-    """One set's fits in all forms that count, the search's own first: a mixture by their evidence."""
+    """One set's fits in all forms that count, the likeliest first: a mixture by their evidence."""
 
     fits: tuple[Fit, ...]
     setting: Setting
@@ -60,10 +60,8 @@ class Sizes:
 
 def sizes_of(found: Search, effects: Set, spread: Spread | None = None) -> Sizes:
     """A set's fit beside the remainder that suits it, and those with one of its effects in another form."""
-    best = found.best_fit(effects)
-    tasks = [(best, form) for form in other_forms(best)]
-    others = [f for f in (spread or found.spread)(in_another_form, tasks) if f is not None]
-    others = [f for f in others if f.log_evidence > best.log_evidence - EXCLUDED]
+    found.refit_in_forms([effects], spread)
+    fits = sorted(found.in_forms[effects], key=lambda f: -f.log_evidence)
     setting = found.problem.model.setting
     assert setting is not None
-    return Sizes((best, *others), setting)
+    return Sizes(tuple(f for f in fits if f.log_evidence > fits[0].log_evidence - EXCLUDED), setting)

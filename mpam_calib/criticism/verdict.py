@@ -113,7 +113,7 @@ def _unseen(found: Search, base: Set) -> frozenset[Set]:
     """Sets with one cause more that the data, whatever the prior odds, hardly tell from ``base``."""
 
     def evidence(effects: Set) -> float:
-        return found.score(effects) - found.log_prior(effects)
+        return found.score_of_best(effects) - found.log_prior(effects)
 
     seen = {effects for effects, _ in found.fits}
     least = evidence(base) - BESIDE

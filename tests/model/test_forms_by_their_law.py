@@ -103,21 +103,42 @@ def test_what_a_supply_loses_may_be_the_same_at_every_pressure(exponent: float) 
     np.testing.assert_allclose(rate, rate[0], rtol=1e-9)
 
 
-@pytest.mark.parametrize("exponent", [2.0 / 3.0, 1.0])
-def test_adhesion_is_a_power_of_the_pressure_alone(exponent: float) -> None:
-    form = "strand_friction:even"
+def rubbing(form: str, share: float, pressure: float, **values: float) -> float:
+    """Friction (N) of strands alone at a share of the stroke, on the way in."""
     setting = setting_for(form)
-    values = {"K_f": one(0.0), "f_s": one(0.3), "strand_exponent": one(exponent)}
+    known = {"K_f": one(0.0), **{name: one(value) for name, value in values.items()}}
+    at = middle(setting, displacement=share * setting.stroke, pressure=pressure)
+    return -float((force(setting, known, at) - force(without(setting), {"K_f": one(0.0)}, at))[0, 0])
 
-    def friction(share: float, pressure: float) -> float:
-        at = middle(setting, displacement=share * setting.stroke, pressure=pressure)
-        found = force(setting, values, at) - force(without(setting), {"K_f": one(0.0)}, at)
-        return -float(found[0, 0])
 
-    for pressure in setting.levels:
-        assert friction(0.9, pressure) == pytest.approx(friction(0.1, pressure), rel=1e-9)
-        expected = friction(0.5, setting.levels[0]) * (pressure / setting.levels[0]) ** exponent
-        assert friction(0.5, pressure) == pytest.approx(expected, rel=1e-9)
+@pytest.mark.parametrize("form", ["strand_friction:even", "strand_friction:pivoting"])
+@pytest.mark.parametrize("exponent", [2.0 / 3.0, 1.0])
+def test_friction_may_go_with_another_power_of_the_pressure(form: str, exponent: float) -> None:
+    values, levels = {"f_s": 0.3, "strand_exponent": exponent}, setting_for(form).levels
+    least = rubbing(form, 0.5, levels[0], **values)
+    for pressure in levels:
+        expected = least * (pressure / levels[0]) ** exponent
+        assert rubbing(form, 0.5, pressure, **values) == pytest.approx(expected, rel=1e-9)
+
+
+def test_adhesion_is_the_same_along_the_stroke() -> None:
+    form, values = "strand_friction:even", {"f_s": 0.3, "strand_exponent": 1.0}
+    for pressure in setting_for(form).levels:
+        there = rubbing(form, 0.1, pressure, **values)
+        assert rubbing(form, 0.9, pressure, **values) == pytest.approx(there, rel=1e-9)
+
+
+def test_crossings_that_pivot_do_the_work_of_their_moments() -> None:
+    """Load P·2πRL, the crossings' turn 2dα for the way dL, from the strands' geometry alone."""
+    form, values = "strand_friction:pivoting", {"f_s": 0.3, "strand_exponent": 1.0}
+    setting, shares = setting_for(form), np.array([0.1, 0.5, 0.9])
+    strand = setting.geometry.L0 / np.sin(setting.geometry.alpha0)
+    length = setting.geometry.L0 - shares * setting.stroke
+    step = 1e-6 * strand
+    turn = (np.arcsin((length + step) / strand) - np.arcsin((length - step) / strand)) / step
+    moments = np.sqrt(strand**2 - length**2) * length * turn
+    found = np.array([rubbing(form, share, setting.top_pressure, **values) for share in shares])
+    np.testing.assert_allclose(found / found[1], moments / moments[1], rtol=1e-6)
 
 
 def test_a_wall_s_share_may_go_with_the_pressure() -> None:
@@ -136,14 +157,14 @@ def test_strands_under_the_sleeve_s_tension_rub_as_under_more_pressure(tension: 
     at = replace(rows(setting, 4), pressure=levels, displacement=np.full(4, 0.004), sign=np.ones(4))
     bare = force(without(setting), {}, at)
 
-    def rubbing(form: str, **values: float) -> np.ndarray:
+    def at_levels(form: str, **values: float) -> np.ndarray:
         known = {"f_s": one(0.3), **{k: one(v) for k, v in values.items()}}
         return np.ravel(force(setting_for(form), known, at) - bare)
 
-    found = rubbing("strand_friction:tension", sleeve_tension_kPa=tension)
+    found = at_levels("strand_friction:tension", sleeve_tension_kPa=tension)
     np.testing.assert_allclose(found / found[0], ((levels + tension) / (levels[0] + tension)) ** (4.0 / 3.0))
-    none = rubbing("strand_friction:tension", sleeve_tension_kPa=1e-9)
-    np.testing.assert_allclose(none, rubbing("strand_friction"), rtol=1e-9)
+    none = at_levels("strand_friction:tension", sleeve_tension_kPa=1e-9)
+    np.testing.assert_allclose(none, at_levels("strand_friction"), rtol=1e-9)
 
 
 def test_strands_that_stretch_grow_longer_and_store_energy() -> None:

@@ -45,6 +45,12 @@ def _even(state: State, values: Values, setting: Setting) -> State:
     )
 
 
+def _pivoting(state: State, values: Values, setting: Setting) -> State:
+    """Crossed strands that turn on each other: moments at the crossings, whose work goes with P^m·L."""
+    longer = state.length / (state.rest.L0 - 0.5 * setting.stroke)
+    return _even(state, {**values, "f_s": values["f_s"] * longer}, setting)
+
+
 def _pressed(state: State, values: Values, setting: Setting) -> Array:
     """What another power of the pressure makes of Eq. 2.43."""
     return power(state.pressure / middle_pressure(setting), values["strand_exponent"] - HERTZIAN)
@@ -104,11 +110,27 @@ register(
         apply=_apply,
         memory=False,
         needs_braid=True,
-        forms={"power": _power, "even": _even, "contact": _contact, "tension": _tension},
-        own={"power": _exponent, "even": _exponent, "contact": _contact_exponent, "tension": _own_tension},
+        forms={
+            "power": _power,
+            "even": _even,
+            "pivoting": _pivoting,
+            "contact": _contact,
+            "tension": _tension,
+        },
+        own={
+            "power": _exponent,
+            "even": _exponent,
+            "pivoting": _exponent,
+            "contact": _contact_exponent,
+            "tension": _own_tension,
+        },
         sources={
             "power": "Amontons ∝ P; Hertzian contacts ∝ P^(2/3) (Archard 1957); Eq. 2.43 ∝ P^(4/3)",
             "even": "adhesion ∝ contact area ∝ P^m, m = 2/3 to 1 (Bowden & Tabor 1950; Archard 1957)",
+            "pivoting": (
+                "textbook: virtual work of friction moments where crossed strands turn on each other, "
+                "P·2πRL·a·2dα/dL with R ∝ cos α: ∝ P^m·L, m = 1 (Amontons) to 4/3 (Hertz)"
+            ),
             "contact": "friction ∝ pressure × contact area along the stroke (Davis & Caldwell 2006)",
             "tension": "Eq. 2.43 of P + P_0, for a sleeve that presses at no pressure too (textbook)",
         },
