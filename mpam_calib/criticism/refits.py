@@ -55,16 +55,18 @@ def with_doubt(found: Fit) -> Fit:
     return found if again is None else again
 
 
-def with_doubted_equations(found: Fit) -> Fit:
-    """:func:`with_doubt`, where a bent effect may follow its own equation instead.
+def with_doubted_equations(task: tuple[Fit, bool]) -> Fit:
+    """:func:`with_doubt`, where a bent effect may follow its equation instead, or (``task`` says) others'.
 
     At its word an equation that is a little off loses to a bend, which costs more than a doubt does.
     """
+    found, others_too = task
     best = with_doubt(found)
     for e, form in named_forms(found).items():
-        if form not in equations_of(e):
-            at_word = _better(None, _with(best, e), best.size, ended(best))
-            doubted = [] if at_word is None else [with_doubt(at_word)]
+        own, *others = equations_of(e)
+        if form not in (own, *others):
+            at_word = [_best_with(best, [own]), _best_with(best, others if others_too else [])]
+            doubted = [with_doubt(equation) for equation in at_word if equation is not None]
             best = max([best, *doubted], key=lambda f: f.log_evidence)
     return best
 
@@ -77,10 +79,18 @@ def other_forms(found: Fit) -> list[str]:
 def in_another_form(task: tuple[Fit, str]) -> Fit | None:
     """A doubted fit with one of its effects in another form, doubted as well; None where that is hopeless."""
     found, form = task
-    at_word = _better(None, _with(found, form), found.size, ended(found))
+    at_word = _best_with(found, [form])
     # By a fit's first doubt, none, its equations are taken at their word.
     plain = found.under[0].log_evidence - sum(map(price, sorted(found.effects)))
     return None if at_word is None or at_word.log_evidence < plain - HOPELESS else with_doubt(at_word)
+
+
+def _best_with(found: Fit, forms: list[str]) -> Fit | None:
+    """The best fit in which one effect has one of these forms instead, at its word."""
+    best: Fit | None = None
+    for form in forms:
+        best = _better(best, _with(found, form), found.size, ended(found))
+    return best
 
 
 def _with(found: Fit, form: str) -> tuple[str, ...]:

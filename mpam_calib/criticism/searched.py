@@ -48,7 +48,7 @@ LEADERS = 5
 """Sets whose parts and forms are looked at once more."""
 DOUBTED_EACH = 4
 """Best sets of every number of effects that are doubted in the end."""
-IN_ALL_FORMS, CLOSE = 10, 12.0
+IN_ALL_FORMS, CLOSE = 6, 12.0
 """So many leading sets, and nats behind the best, of which all forms have their say in the end."""
 TURNS = 2
 """Times that the forms are gone through, where the likeliest was another one."""
@@ -239,8 +239,9 @@ class Search:
         keys = [key for key in self.fits if key[0] in chosen]
         rest = [key for key in keys if key[1] != self.best_size(key[0])]
         best = [key for key in keys if key[1] == self.best_size(key[0])]
+        tasks = [(self.fits[key], key[0] in sets[:LEADERS]) for key in best]
         doubted = [
-            *self.spread(with_doubted_equations, [self.fits[key] for key in best]),
+            *self.spread(with_doubted_equations, tasks),
             *self.spread(with_doubt, [self.fits[key] for key in rest]),
         ]
         # A doubt has its price in evidence: who does not pay it cannot be compared with those who do.

@@ -190,9 +190,10 @@ def test_an_equation_that_is_a_little_off_is_not_left_to_a_bend(identifier: str)
         doubted_bend, doubted = spread(with_doubt, [bent, equation])
         assert bent.log_evidence > equation.log_evidence
         assert doubted.log_evidence > doubted_bend.log_evidence + 5.0
-        (chosen,) = spread(with_doubted_equations, [bent])
+        (chosen, among_all) = spread(with_doubted_equations, [(bent, False), (bent, True)])
     assert chosen.effects == effects
     assert chosen.log_evidence == pytest.approx(doubted.log_evidence, abs=0.5)
+    assert among_all.log_evidence >= chosen.log_evidence
 
 
 def test_a_climb_is_given_up_only_without_hope(monkeypatch: pytest.MonkeyPatch) -> None:
