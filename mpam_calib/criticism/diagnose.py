@@ -83,6 +83,8 @@ def diagnose(
     verdict = judge(found)
     for size in range(len(SIZES)):
         found.refit(verdict.standing, size)
+    with journalled(problem, WORKERS, journal) as spread:
+        found.refit_in_forms([verdict.standing], spread)
     budget = misfit_budget(found, verdict.standing)
     gain = None
     if verdict.standing:
@@ -93,10 +95,10 @@ def diagnose(
     fits = [found.fits[s, found.best_size(s)] for s in (frozenset(), verdict.standing)]
     structure = list(zip(*(structure_tests(problem, f) for f in fits), strict=True))
     limits = {}
-    with journalled(problem, WORKERS, journal) as spread:
-        sizes = sizes_of(found, verdict.standing, spread)
-        if verdict.word in ("adequate", "named"):
+    if verdict.word in ("adequate", "named"):
+        with journalled(problem, WORKERS, journal) as spread:
             limits = hidden_sizes(problem, tested.tested, fits[1], spread)
+    sizes = sizes_of(found, verdict.standing)
     return Diagnosis(problem, tested, found, verdict, budget, gain, structure, limits, sizes)
 
 

@@ -14,7 +14,6 @@ from scipy import special
 from mpam_calib.criticism.fit import Fit
 from mpam_calib.criticism.refits import Set, named_forms
 from mpam_calib.criticism.searched import Search
-from mpam_calib.criticism.spread import Spread
 from mpam_calib.model.effect import effect
 from mpam_calib.model.state import Setting
 
@@ -58,9 +57,9 @@ class Sizes:
         return np.concatenate([prior.from_normal(u) for prior, u in zip(priors, drawn, strict=True)])
 
 
-def sizes_of(found: Search, effects: Set, spread: Spread | None = None) -> Sizes:
+def sizes_of(found: Search, effects: Set) -> Sizes:
     """A set's fit beside the remainder that suits it, and those with one of its effects in another form."""
-    found.refit_in_forms([effects], spread)
+    found.refit_in_forms([effects])
     fits = sorted(found.in_forms[effects], key=lambda f: -f.log_evidence)
     setting = found.problem.model.setting
     assert setting is not None
