@@ -83,6 +83,7 @@ def diagnose(
     verdict = judge(found)
     for size in range(len(SIZES)):
         found.refit(verdict.standing, size)
+    # Its likeliest form first: budget, gain and extended model are all made from it.
     with journalled(problem, WORKERS, journal) as spread:
         found.refit_in_forms([verdict.standing], spread)
     budget = misfit_budget(found, verdict.standing)
