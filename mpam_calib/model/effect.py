@@ -55,11 +55,12 @@ class Effect:
     multiply a size; where it may come back to nothing and pass it, they are ``added`` in units of its prior
     sd. A bent effect without parameters reads its size under its own id.
 
-    Other authors' equations are forms, too: ``own`` are the parameters that a form has beside the effect's
-    (such forms do not bend), ``leading`` how many of the effect's it makes use of, where not of all,
-    ``recalls`` the forms that have a memory and ``by_force`` those that need the force, though the effect
-    does not, ``apart`` those that no bend stands for, and ``sources`` where the forms' equations are from. A
-    ``fault`` of an instrument is no cause to be searched, named or declared, but a rival of all causes.
+    Other authors' equations are forms, too: ``own`` are the parameters that a form has beside the effect's,
+    or in place of those of the same name (such forms do not bend), ``leading`` how many of the effect's it
+    makes use of, where not of all, ``recalls`` the forms that have a memory and ``by_force`` those that need
+    the force, though the effect does not, ``apart`` those that no bend stands for, and ``sources`` where the
+    forms' equations are from. A ``fault`` of an instrument is no cause to be searched, named or declared, but
+    a rival of all causes.
     """
 
     id: str
@@ -131,8 +132,9 @@ def formed(item: Effect, form: str) -> Effect:
     """The effect in one of its ``forms``, with the parameters and the source that the form has of its own."""
 
     def parameters(setting: Setting) -> tuple[Parameter, ...]:
-        shared = item.parameters(setting)[: item.leading.get(form)]
-        return (*shared, *(item.own[form](setting) if form in item.own else ()))
+        own = {p.name: p for p in (item.own[form](setting) if form in item.own else ())}
+        shared = {p.name: p for p in item.parameters(setting)[: item.leading.get(form)]}
+        return tuple((shared | own).values())
 
     return replace(
         item,

@@ -263,6 +263,24 @@ def test_grips_bed_in_with_each_cycle() -> None:
     np.testing.assert_allclose(moved, 2e-3 * (1.0 - 0.6 * np.exp(-loaded / 3.0)))
 
 
+@pytest.mark.parametrize("sds", [-1.0, 1.0])
+def test_a_gain_error_has_the_size_of_an_instrument_s(sds: float) -> None:
+    """At one prior sd about 2 % of the reading; a fifth of it is no scale but the muscle's ends."""
+    for form in ("length_offset:scale", "length_offset:line"):
+        setting = setting_for(form)
+        at = {p.name: float(p.prior.from_normal(np.array(sds))) for p in effect(form).parameters(setting)}
+        before, after = applied(form, **at | {"offset_mm": abs(at["offset_mm"])})
+        moved = np.ravel(after.displacement - before.displacement)
+        slope, _ = np.polyfit(np.ravel(before.displacement), moved, 1)
+        assert 0.015 < abs(slope) < 0.03
+        fifth = {"offset_mm": 0.2 * 0.5 * setting.stroke, "scale_share": 1.0}
+        away = {
+            p.name: float(p.prior.to_normal(np.array(fifth[p.name])))
+            for p in effect(form).parameters(setting)
+        }
+        assert max(map(abs, away.values())) > 4.0
+
+
 def test_conical_ends_ease_as_tondu_and_lopez_have_it() -> None:
     """k = a·e^(−P) + b: what is linear in e^(−P/p) at every contraction; without a, the plain cone."""
     setting = setting_for("tip_shape:easing")

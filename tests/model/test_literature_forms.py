@@ -110,7 +110,8 @@ def middle(setting: Setting, **away: float) -> Readings:
 def drawn(form: str, setting: Setting, size: float, shape: float) -> dict[str, np.ndarray]:
     """Values with the effect's own parameters and those of the form at so many prior sds."""
     item, (identifier, _, name) = effect(form), form.partition(":")
-    own = {p.name for p in effect(identifier).own.get(name, lambda setting: ())(setting)}
+    sizes = {p.name for p in effect(identifier).parameters(setting)}
+    own = {p.name for p in effect(identifier).own.get(name, lambda setting: ())(setting)} - sizes
     return {
         p.name: p.prior.from_normal(np.full((1, 1), shape if p.name in own else size))
         for p in item.parameters(setting)
@@ -131,7 +132,8 @@ def test_a_form_says_what_it_is_and_may_be_declared(form: str) -> None:
     shared, all_names = ([p.name for p in i.parameters(setting)] for i in (base, item))
     own = base.own[name](setting) if name in base.own else ()
     assert len(own) <= (len(setting.levels) if name in base.apart else 2)
-    assert all_names == [*shared[: base.leading.get(name)], *(p.name for p in own)]
+    kept = shared[: base.leading.get(name)]
+    assert all_names == [*kept, *(p.name for p in own if p.name not in kept)]
     assert all(p.meaning for p in item.parameters(setting))
     for parameter in own:
         assert (parameter.unit == "") == (unit_of(parameter.name) == "")
