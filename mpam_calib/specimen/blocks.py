@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.recording import BRANCH_WORDS
-from mpam_calib.specimen.tables import TEXT_COLUMNS, TableSpec
+from mpam_calib.specimen.tables import GAPPED_COLUMNS, TEXT_COLUMNS, TableSpec
 from mpam_calib.specimen.text_format import TextFormat, is_number, refuse_other_than_text
 from mpam_calib.specimen.wording import did_you_mean, listed, quoted
 
@@ -144,19 +144,22 @@ def _parse(label: str, lines: _Lines, form: TextFormat) -> tuple[pd.DataFrame, T
 
 def _frame(raw: bytes, form: TextFormat, *, text: bool) -> pd.DataFrame:
     fields = sorted(form.fields, key=lambda field: field.position)
-    types: dict[int, str] = {
-        field.position: "str" if text else ("category" if field.name in TEXT_COLUMNS else "float64")
+    types: dict[str, str] = {
+        str(field.position): "str" if text else ("category" if field.name in TEXT_COLUMNS else "float64")
         for field in fields
     }
+    gapped = {str(field.position): [""] for field in fields if field.name in GAPPED_COLUMNS and not text}
     frame: pd.DataFrame = pd.read_csv(
         io.BytesIO(raw),
         sep=form.delimiter,
         decimal=form.decimal,
         header=None,
-        names=list(range(form.cells)),
-        usecols=[field.position for field in fields],
+        names=list(map(str, range(form.cells))),
+        usecols=list(types),
         dtype=types,
-        na_filter=False,
+        keep_default_na=False,
+        na_values=gapped,
+        na_filter=bool(gapped),
         skipinitialspace=True,
         index_col=False,
         encoding=form.encoding,
@@ -189,6 +192,8 @@ def _first_bad_cell(label: str, lines: _Lines, form: TextFormat) -> tuple[int, s
     number = rf"\s*[+-]?(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:[eE][+-]?\d+)?\s*|\s*[+-]?inf(?:inity)?\s*"
     numeric = [name for name in frame.columns if name not in TEXT_COLUMNS]
     good = np.column_stack([frame[name].str.fullmatch(number, case=False).to_numpy(bool) for name in numeric])
+    for name in GAPPED_COLUMNS.intersection(numeric):
+        good[:, numeric.index(name)] |= ~frame[name].str.strip().astype(bool).to_numpy()
     wrong = np.argwhere(~good)
     if not len(wrong):
         raise InputError(

@@ -32,6 +32,7 @@ from mpam_calib.specimen.plausibility import (
 from mpam_calib.specimen.recording import DEPRESSURISING, PRESSURISING, Bools, Floats, Ints, Loops
 from mpam_calib.specimen.reduction import average_rows, rows_per_mean
 from mpam_calib.specimen.source import DataFile
+from mpam_calib.specimen.tables import GAPPED_COLUMNS
 from mpam_calib.specimen.wording import listed
 from mpam_calib.units import KPA, MM
 
@@ -148,7 +149,9 @@ def _read_file(file: DataFile, averaged: int, floor_N: float | None) -> tuple[pd
     frame = pd.concat(kept)
     if "branch" in frame and not frame["branch"].any():
         frame = frame.drop(columns="branch")  # empty all along: not given
-    return frame, clock
+    for name in GAPPED_COLUMNS.intersection(frame.columns):
+        frame[name] = frame[name].interpolate(limit_direction="both")
+    return frame.dropna(axis="columns"), clock
 
 
 def censored_rows(frame: pd.DataFrame, floor_N: float | None) -> Bools:

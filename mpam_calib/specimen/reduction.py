@@ -35,14 +35,12 @@ def average_rows(frame: pd.DataFrame, rows: int, censored: Bools) -> tuple[pd.Da
     part = within * groups[run] // length[run]
     starts = np.flatnonzero(cuts | (np.diff(part, prepend=0) != 0))
     sizes = np.diff(np.append(starts, len(frame)))
-    means = {
-        name: np.add.reduceat(frame[name].to_numpy(dtype=float), starts) / sizes
-        for name in frame.columns
-        if name not in _LABELS
-    }
-    means |= {name: frame[name].to_numpy()[starts] for name in _LABELS if name in frame}
+    measured = frame.drop(columns=[name for name in _LABELS if name in frame]).astype(float)
+    means = measured.groupby(np.repeat(np.arange(len(starts)), sizes)).mean()  # empty cells do not count
+    means.index = frame.index[starts]
+    labels = {name: frame[name].to_numpy()[starts] for name in _LABELS if name in frame}
     share = np.add.reduceat(censored.astype(float), starts) / sizes
-    return pd.DataFrame(means, index=frame.index[starts]), share >= 0.5
+    return means.assign(**labels), share >= 0.5
 
 
 def _cuts(frame: pd.DataFrame) -> Bools:

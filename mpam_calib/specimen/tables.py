@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 TEXT_COLUMNS: Final = frozenset({"branch"})
 """Columns that hold words; every other column holds numbers."""
+GAPPED_COLUMNS: Final = frozenset({"temperature_C"})
+"""Columns whose cells may be empty: an instrument slower than the load cell fills few rows."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class TableSpec:
         def column(name: str) -> pa.Column:
             rules = [FINITE, *([RULES[name]] if name in RULES else [])]
             checks = [pa.Check(rule.holds, name=rule.expected, n_failure_cases=1) for rule in rules]
-            return pa.Column(float, checks, required=False)
+            return pa.Column(float, checks, required=False, nullable=name in GAPPED_COLUMNS)
 
         return pa.DataFrameSchema({name: column(name) for name in self.columns if name not in TEXT_COLUMNS})
 

@@ -113,6 +113,15 @@ CASES: dict[str, tuple[Spoil, list[str]]] = {
         rows(lambda lines: [line + (",force_N" if not i else ",1.0") for i, line in enumerate(lines)]),
         ['loops.csv:1:force_N: found "force_N" twice'],
     ),
+    "a temperature in words": (
+        rows(
+            lambda lines: [
+                line + (",warm" if i == 9 else ",") if i else line + ",temperature_C"
+                for i, line in enumerate(lines)
+            ]
+        ),
+        ['loops.csv:10:temperature_C: found "warm", expected a number'],
+    ),
     "text": (cell(12, 3, "abc"), ['loops.csv:12:force_N: found "abc", expected a number']),
     "empty cell": (cell(12, 1, ""), ["loops.csv:12:pressure_kPa: found an empty cell"]),
     "NaN": (cell(5, 2, "NaN"), ['loops.csv:5:displacement_mm: found "NaN", expected a number']),

@@ -136,6 +136,25 @@ def test_given_branches_and_cycles_are_kept(tmp_path: Path) -> None:
     assert found.temperature_C is not None and set(found.temperature_C) == {21.5}
 
 
+@pytest.mark.parametrize(
+    ("every", "found"), [(40, True), (10**6, True), (0, False)], ids=["slower", "once", "never"]
+)
+def test_a_thermometer_may_be_slower_than_the_load_cell(tmp_path: Path, every: int, found: bool) -> None:
+    """Between its readings the temperature goes straight; without any reading there is none."""
+    body = loops((50.0, 100.0)).text().splitlines()
+    count = len(body) - 1
+    true = 20.0 + 0.01 * np.arange(count)
+    cells = [f"{t:.2f}" if every and not i % every else " " * (i % 2) for i, t in enumerate(true)]
+    text = "\n".join([body[0] + ",temperature_C", *map(",".join, zip(body[1:], cells, strict=True))])
+    read_back = loops_of(read(make(tmp_path, loops=text))).temperature_C
+    if not found:
+        assert read_back is None
+        return
+    assert read_back is not None
+    last = (count - 1) // every * every
+    np.testing.assert_allclose(read_back, np.minimum(true, true[last]))
+
+
 def test_held_length_with_given_words(tmp_path: Path) -> None:
     pressure = np.concatenate([np.linspace(0, 200, 100), np.linspace(200, 0, 100)])
     words = np.repeat(["pressurising", "depressurising"], 100)

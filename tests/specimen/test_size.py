@@ -86,6 +86,21 @@ def test_averages_keep_strokes_levels_and_means(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("few_rows_kept")
+def test_averages_leave_empty_cells_out(tmp_path: Path) -> None:
+    """A temperature in every seventh row, and averages of more rows and of fewer between."""
+    recording = noisy()
+    body = recording.text().splitlines()
+    true = 20.0 + recording.time / 60.0
+    cells = [f"{t:.4f}" if not i % 7 else "" for i, t in enumerate(true)]
+    text = "\n".join([body[0] + ",temperature_C", *map(",".join, zip(body[1:], cells, strict=True))])
+    found = read(make(tmp_path, loops=text)).loops
+    assert found is not None and found.averaged > 2 and found.temperature_C is not None
+    seven_rows_min = 7.0 * float(np.median(np.diff(recording.time))) / 60.0
+    expected = 20.0 + (found.time_s + recording.time[0]) / 60.0
+    assert np.abs(found.temperature_C - expected).max() < 1.5 * seven_rows_min
+
+
+@pytest.mark.usefixtures("few_rows_kept")
 def test_averages_do_not_depend_on_where_the_blocks_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
