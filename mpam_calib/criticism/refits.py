@@ -99,8 +99,29 @@ def _with(found: Fit, form: str) -> tuple[str, ...]:
 
 
 def with_better_forms(found: Fit) -> Fit:
-    """The fit with its forms changed one at a time."""
-    return _one_at_a_time(found, forms_of)
+    """The fit with its forms changed one at a time; a pair's also from the effects' own equations on.
+
+    Of two causes that act at the same moment each may have a form that makes up for the other's, and no
+    change of one alone leads on. Larger sets take over what their pairs have chosen.
+    """
+    best = _one_at_a_time(found, forms_of)
+    others = _from_equations(best) if len(best.effects) == 2 else []
+    return max([best, *others], key=lambda f: f.log_evidence)
+
+
+def _from_equations(found: Fit) -> list[Fit]:
+    """Fits from the own equations on, each given up once for another form, the one that helps most first."""
+    start = _better(None, tuple(named_forms(found)), found.size, ended(found))
+    fits = [] if start is None else [start]
+    while fits:
+        best = now = fits[-1]
+        for e in sorted(now.effects & named_forms(now).keys()):  # still in its own equation
+            for form in forms_of(e)[1:]:
+                best = _better(best, _with(now, form), now.size, ended(now)) or best
+        if best is now:
+            break
+        fits.append(best)
+    return fits[-1:]
 
 
 def with_better_kinds(found: Fit) -> Fit:

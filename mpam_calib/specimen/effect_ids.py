@@ -36,7 +36,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "braid_stretch": ("bent", "longer-bent", "power", "longer", "both"),
     "wall_pressure": ("bent", "thick", "pressed"),
     "length_offset": ("bent", "scale", "line", "slip", "settling", "bedding", "seating", "rezeroed"),
-    "strand_friction": ("bent", "power", "even", "pivoting", "contact", "tension"),
+    "strand_friction": ("bent", "power", "even", "pivoting", "contact", "surface", "tension"),
     "coulomb_friction": ("bent", "constant", "capstan", "power"),
     "rate_friction": (
         *("bent", "viscous", "viscous-bent", "power", "stribeck", "drag"),

@@ -121,6 +121,21 @@ def test_friction_may_go_with_another_power_of_the_pressure(form: str, exponent:
         assert rubbing(form, 0.5, pressure, **values) == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.parametrize("power", [2.0 / 3.0, 1.0])
+def test_a_pressed_surface_rubs_all_over(power: float) -> None:
+    """Amontons on P·2πRL, or on another power of the pressure, from the strands' geometry alone."""
+    form, values = "strand_friction:surface", {"f_s": 0.3, "strand_exponent": power, "contact_exponent": -1.0}
+    setting, shares = setting_for(form), np.array([0.1, 0.5, 0.9])
+    strand = setting.geometry.L0 / np.sin(setting.geometry.alpha0)
+    length = setting.geometry.L0 - shares * setting.stroke
+    surface = np.sqrt(strand**2 - length**2) * length
+    for pressure in setting.levels:
+        found = np.array([rubbing(form, share, pressure, **values) for share in shares])
+        at_top = np.array([rubbing(form, share, setting.top_pressure, **values) for share in shares])
+        np.testing.assert_allclose(found / found[1], surface / surface[1], rtol=1e-6)
+        np.testing.assert_allclose(found / at_top, (pressure / setting.top_pressure) ** power, rtol=1e-9)
+
+
 def test_adhesion_is_the_same_along_the_stroke() -> None:
     form, values = "strand_friction:even", {"f_s": 0.3, "strand_exponent": 1.0}
     for pressure in setting_for(form).levels:

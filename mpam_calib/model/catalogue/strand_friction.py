@@ -45,6 +45,16 @@ def _even(state: State, values: Values, setting: Setting) -> State:
     )
 
 
+def _surface(state: State, values: Values, setting: Setting) -> State:
+    """Such a power of the pressure and another of the contact's spread: what P·2πRL presses together."""
+    return _contact(state, {**values, "f_s": values["f_s"] * _pressed(state, values, setting)}, setting)
+
+
+def _powers(setting: Setting) -> tuple[Parameter, ...]:
+    grown = Parameter("contact_exponent", Normal(-1.0, 0.5), "power of the contact's spread", "", "")
+    return (*_exponent(setting), grown)
+
+
 def _pivoting(state: State, values: Values, setting: Setting) -> State:
     """Crossed strands that turn on each other: moments at the crossings, whose work goes with P^m·L."""
     longer = state.length / (state.rest.L0 - 0.5 * setting.stroke)
@@ -115,6 +125,7 @@ register(
             "even": _even,
             "pivoting": _pivoting,
             "contact": _contact,
+            "surface": _surface,
             "tension": _tension,
         },
         own={
@@ -122,6 +133,7 @@ register(
             "even": _exponent,
             "pivoting": _exponent,
             "contact": _contact_exponent,
+            "surface": _powers,
             "tension": _own_tension,
         },
         sources={
@@ -132,6 +144,7 @@ register(
                 "P·2πRL·a·2dα/dL with R ∝ cos α: ∝ P^m·L, m = 1 (Amontons) to 4/3 (Hertz)"
             ),
             "contact": "friction ∝ pressure × contact area along the stroke (Davis & Caldwell 2006)",
+            "surface": "Amontons between bladder and braid, μ·P·2πRL, or another power of either (textbook)",
             "tension": "Eq. 2.43 of P + P_0, for a sleeve that presses at no pressure too (textbook)",
         },
         bends={"pressure": 1, "contraction": 2},
