@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.fit import Fit, chain_for, fit
+from criticism.test_sizes import force_with
+from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.forms import forms_of, price
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.refits import ended, with_better_forms
@@ -25,12 +25,9 @@ def problem() -> Problem:
     """Both causes hidden in a case that hides nothing else."""
     recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
     bare = problem_of(specimen_of(recipe.name))
-    start, n = fit(bare, frozenset(), 0), len(bare)
-    chain = chain_for(bare.blueprint.model_dump_json(), TRUE)
-    at = dict(zip(start.names, start.u.tolist(), strict=True)) | SIZES
-    values = {p.name: p.prior.from_normal(np.full((1, 1), at[p.name])) for p in chain.parameters}
-    force = chain.force(values, start.eta[None], bare.readings)[0]
-    return bare.with_force(bare.force - start.force + 0.5 * (force[:n] + force[n:]))
+    start = fit(bare, frozenset(), 0)
+    change = force_with(bare, start, "+".join(TRUE), SIZES) - start.force
+    return bare.with_force(bare.force + change)
 
 
 def priced(found: Fit) -> Fit:
