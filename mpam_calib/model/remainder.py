@@ -1,9 +1,10 @@
 """The remainder: what the declared physics leaves, as a smooth surface of inferred, a priori small size.
 
-δ(contraction, pressure, branch) = amplitude · Σ w_i φ_i η_i with η ~ N(0, I): half-waves along the
-contraction × Legendre polynomials in pressure × {both branches alike, branches apart}, weights falling
-with the wave number. A second, rougher part belongs to each stroke alone (:mod:`mpam_calib.posterior.bins`
-carries its kernel); together they keep the bands honest where the model is wrong.
+δ(contraction, pressure, branch) = amplitude · Σ w_i φ_i η_i with η ~ N(0, I): Legendre polynomials along
+the contraction × such in pressure × {both branches alike, branches apart}, weights falling with the
+degree. (Half-waves would be level at full length, where the blocked force is read.) A second, rougher part
+belongs to each stroke alone (:mod:`mpam_calib.posterior.bins` carries its kernel); together they keep the
+bands honest where the model is wrong.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from mpam_calib.model.state import Setting
 
 Array = NDArray[np.float64]
 
-HALF_WAVES, PRESSURE_DEGREE, KEPT = 8, 6, 40
+DEGREE, PRESSURE_DEGREE, KEPT = 7, 6, 40
 MARGIN = 1.25
-"""The half-waves span this multiple of the geometric contraction, so that the edge is not special."""
+"""The polynomials span this multiple of the geometric contraction."""
 SMOOTH, ROUGH = "remainder_sd_N", "stroke_remainder_sd_N"
 
 
@@ -46,7 +47,7 @@ class Remainder:
     span: float
     top_pressure: float
     index: NDArray[np.int64]
-    """(k, 3): half-wave number, pressure degree, branch part (0 alike, 1 apart)"""
+    """(k, 3): degree along the contraction, in pressure, branch part (0 alike, 1 apart)"""
     weights: Array
 
     @staticmethod
@@ -54,13 +55,13 @@ class Remainder:
         """The basis for a setting; ``branches`` where rows have a branch at all."""
         degrees = min(PRESSURE_DEGREE, len(setting.levels) - 1) + 1
         grid = np.stack(
-            np.meshgrid(np.arange(HALF_WAVES), np.arange(degrees), np.arange(1 + branches), indexing="ij"), -1
+            np.meshgrid(np.arange(DEGREE + 1), np.arange(degrees), np.arange(1 + branches), indexing="ij"), -1
         ).reshape(-1, 3)
         weights = 1.0 / ((1.0 + grid[:, 0]) * (1.0 + grid[:, 1]) * (1.0 + grid[:, 2]))
         kept = np.argsort(-weights, kind="stable")[:KEPT]
         grid, weights = grid[kept], weights[kept]
-        # Mean square over the span is amplitude²: cos² averages 1/2, Legendre l averages 1/(2l + 1).
-        power = weights**2 * np.where(grid[:, 0] > 0, 0.5, 1.0) / (2.0 * grid[:, 1] + 1.0)
+        # Mean square over the span is amplitude²: the square of degree l averages 1/(2l + 1).
+        power = weights**2 / ((2.0 * grid[:, 0] + 1.0) * (2.0 * grid[:, 1] + 1.0))
         return Remainder(
             setting.geometry.L0,
             MARGIN * geometric_contraction(setting.geometry),
@@ -77,10 +78,14 @@ class Remainder:
     def columns(self, readings: Readings) -> Array:
         """Basis at the readings, (n, k), for amplitude 1 N."""
         gamma = readings.displacement / self.geometry_length / self.span
-        # Beyond the highest level a polynomial would run away; there it stays what it was at the edge.
-        P = np.clip(2.0 * readings.pressure / self.top_pressure - 1.0, -1.0, 1.0)
-        waves = np.cos(np.pi * self.index[:, 0] * gamma[:, None])
-        legendre = np.polynomial.legendre.legvander(P, int(self.index[:, 1].max()))[:, self.index[:, 1]]
+        along = _legendre(gamma, self.index[:, 0])
+        across = _legendre(readings.pressure / self.top_pressure, self.index[:, 1])
         side = np.where(self.index[:, 2] == 1, readings.sign[:, None], 1.0)
-        result: Array = waves * legendre * side * self.weights
+        result: Array = along * across * side * self.weights
         return result
+
+
+def _legendre(share: Array, degree: NDArray[np.int64]) -> Array:
+    """Polynomials (n, k) on 0 … 1; beyond, where they would run away, they stay what they are at the edge."""
+    vander = np.polynomial.legendre.legvander(np.clip(2.0 * share - 1.0, -1.0, 1.0), int(degree.max()))
+    return np.asarray(vander[:, degree])

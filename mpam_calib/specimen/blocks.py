@@ -72,7 +72,7 @@ def _row_blocks(path: Path, label: str, form: TextFormat) -> Iterator[_Lines]:
                 raw, rest = raw + b"\n", b""
             refuse_other_than_text(label, raw)
             count = raw.count(b"\n")
-            lines = _without_blank_rows(raw, row, form.header_row - row)
+            lines = _without_blank_rows(raw, row, form.rows_above - row)
             row += count
             if len(lines.rows):
                 yield lines

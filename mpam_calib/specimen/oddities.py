@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from mpam_calib.specimen.declaration import Geometry
 from mpam_calib.specimen.plausibility import longest_contraction
 from mpam_calib.specimen.recording import Floats, Loops, Specimen
 from mpam_calib.specimen.summary import BRANCH_NAMES, sampling_rates, stroke_speeds
@@ -20,7 +21,9 @@ FAR_LEVEL = 0.5
 USUAL_SHARE = 0.99
 """Forces and pressures up to this quantile are the usual ones ..."""
 FAR = 30.0
-"""... and this many times as large is far from them; forces of muscles are within it of the gas's own."""
+"""... and this many times as large is far from them."""
+GAS = 3.0
+"""Forces of muscles are within this factor of what the gas alone pulls."""
 SLOW_HZ, FAST = 0.05, 0.2
 """Readings rarer than this, and crossheads faster (m/s), are no tensile tester's."""
 STIFFNESS_PA = 100.0, 1e11
@@ -115,33 +118,66 @@ def _odd_levels(loops: Loops, levels_Pa: Floats) -> list[str]:
 
 
 def _odd_forces(specimen: Specimen) -> list[str]:
-    """Forces far from what the gas can pull, and readings far from all others."""
+    """Forces far from the gas's or from all others, a zero or a sign that is off."""
     if specimen.geometry is None:
         return []
-    geometry, remarks = specimen.geometry, []
-    # Chou and Hannaford 1996 (doi:10.1109/70.481753) at the initial length; alpha0 from the hoop direction.
-    per_pascal = 3.0 * math.tan(geometry.alpha0) ** 2 - 1.0 / math.cos(geometry.alpha0) ** 2
-    per_pascal *= math.pi * geometry.R0**2
-    for name, part in (
-        ("loops", specimen.loops),
-        ("force_map", specimen.force_map),
-        ("blocked_force", specimen.blocked_force),
-    ):
-        if part is None:
-            continue
-        usual = float(np.quantile(np.abs(part.force_N), USUAL_SHARE))
-        stray = int((np.abs(part.force_N) > FAR * usual).sum()) if usual > 0.0 else 0
-        if stray:
-            extreme = part.force_N[np.abs(part.force_N).argmax()]
-            many = "a force is" if stray == 1 else f"{stray} forces are"
-            remarks.append(f"{name}: {many} far from all others ({extreme:.4g} N)")
-        gas = per_pascal * float(np.quantile(part.pressure_Pa, USUAL_SHARE))
-        if gas > 0.0 and not gas / FAR < usual < FAR * gas:
+    geometry, remarks, parts = specimen.geometry, [], _with_contraction(specimen)
+    for name, (pressure, contraction, force) in parts.items():
+        remarks += _stray_forces(name, specimen, force)
+        usual, top = (float(np.quantile(np.abs(x), USUAL_SHARE)) for x in (force, pressure))
+        gas = _gas_force(geometry, top, max(float(contraction.min()), 0.0))
+        if gas > 0.0 and not gas / GAS < usual < GAS * gas:
             remarks.append(
                 f"{name}: forces up to {usual:.3g} N, while the gas alone pulls about {gas:.3g} N at the "
-                "highest pressure; are the units of force, pressure and radius right?"
+                "highest pressure; are the units of force and pressure right, and R0_mm a radius?"
+            )
+        level = np.abs(pressure[:, None] - specimen.levels_Pa).argmin(axis=1)
+        below = [specimen.levels_Pa[i] / KPA for i in np.unique(level) if force[level == i].max() < 0.0]
+        if below and specimen.levels_Pa.max() > 0.0:
+            remarks.append(
+                f"{name}: every force at {below[0]:.4g} kPa is below zero; was the load cell zeroed?"
+            )
+        here = [(contraction[level == i], force[level == i]) for i in np.unique(level)]
+        rises = [np.cov(x, f)[0, 1] > 0.0 for x, f in here if np.ptp(x) > 0.0]
+        if rises and np.mean(rises) > 0.5:
+            column = "displacement_mm" if name == "loops" else "contraction"
+            remarks.append(
+                f"{name}: the force grows with the contraction at {sum(rises)} of {len(rises)} levels; does "
+                f"{column} count the shortening from L0?"
             )
     return remarks
+
+
+def _with_contraction(specimen: Specimen) -> dict[str, tuple[Floats, Floats, Floats]]:
+    """Pressure (Pa), contraction and force (N) of the readings of each kind of force data."""
+    assert specimen.geometry is not None
+    found = {}
+    if (loops := specimen.loops) is not None:
+        found["loops"] = loops.pressure_Pa, loops.displacement_m / specimen.geometry.L0, loops.force_N
+    if (map_ := specimen.force_map) is not None:
+        found["force_map"] = map_.pressure_Pa, map_.contraction, map_.force_N
+    if (blocked := specimen.blocked_force) is not None:
+        found["blocked_force"] = blocked.pressure_Pa, np.zeros(len(blocked.force_N)), blocked.force_N
+    return found
+
+
+def _gas_force(geometry: Geometry, pressure: float, contraction: float) -> float:
+    """Chou and Hannaford 1996 (doi:10.1109/70.481753), N; alpha0 from the hoop direction."""
+    a, b = 3.0 * math.tan(geometry.alpha0) ** 2, 1.0 / math.cos(geometry.alpha0) ** 2
+    return math.pi * geometry.R0**2 * pressure * (a * (1.0 - contraction) ** 2 - b)
+
+
+def _stray_forces(name: str, specimen: Specimen, force: Floats) -> list[str]:
+    """Readings so far from all others that they are codes for missing values, or knocks."""
+    usual = float(np.quantile(np.abs(force), USUAL_SHARE))
+    stray = int((np.abs(force) > FAR * usual).sum()) if usual > 0.0 else 0
+    if not stray:
+        return []
+    row = int(np.abs(force).argmax())
+    loops = specimen.loops if name == "loops" else None
+    when = "" if loops is None else f" at {loops.time_s[row]:.6g} s"
+    many = "a force is" if stray == 1 else f"{stray} forces are"
+    return [f"{name}: {many} far from all others ({force[row]:.4g} N{when})"]
 
 
 def _odd_contractions(specimen: Specimen) -> list[str]:

@@ -15,7 +15,7 @@ from mpam_calib.units import ATMOSPHERE, KPA, MM
 HIGHEST_LEVEL_KPA = 5000.0
 HIGHEST_STRAIN = 20.0
 LEAST_STROKE = 0.005
-"""Smaller largest displacements, as a share of L0, are taken for metres."""
+"""Smaller largest displacements, as a share of L0, are taken for metres, or lengthening for shortening."""
 LONG_SHARE = 0.1
 """Share of the rows that are taken as those where the muscle is long."""
 AGAINST = 0.8
@@ -98,10 +98,11 @@ def check_displacement(
             found = f"a displacement that never moves ({millimetres[0]:g} throughout)"
             expected = "loops over length, or branch pressurising/depressurising at held length"
             raise InputError(label, found, expected, None, column)
-        largest = float(np.abs(millimetres).max())
+        largest = float(millimetres.max())
         if largest < LEAST_STROKE * geometry.L0_mm:
-            found = f"a largest displacement of {largest:.3g} mm (metres?)"
-            hint = map_hint("loops", column, "1000.0")
+            flipped = millimetres.min() <= -LEAST_STROKE * geometry.L0_mm
+            found = f"a largest displacement of {largest:.3g} mm ({'flipped sign' if flipped else 'metres'}?)"
+            hint = map_hint("loops", column, "-1.0" if flipped else "1000.0")
             expected = f"at least {LEAST_STROKE:g} of L0 = {geometry.L0_mm:g} mm; {hint}"
             raise InputError(label, found, expected, None, column)
     check_contraction(label, displacement_m / geometry.L0, rows, geometry, "loops", column)

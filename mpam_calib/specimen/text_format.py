@@ -11,6 +11,7 @@ from pathlib import Path
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import Column, Csv
 from mpam_calib.specimen.tables import TEXT_COLUMNS, TableSpec
+from mpam_calib.specimen.units_row import is_units_row
 from mpam_calib.specimen.wording import did_you_mean, listed, os_reason, quoted
 
 SAMPLE_BYTES = 1 << 17
@@ -37,7 +38,7 @@ class Field:
 
 @dataclass(frozen=True)
 class TextFormat:
-    """How one file is written; ``header_row`` counts from 1, as an editor does.
+    """How one file is written; its data begin below ``rows_above`` rows.
 
     ``decimal_seen`` is false while no cell has shown a decimal mark yet.
     """
@@ -47,7 +48,7 @@ class TextFormat:
     delimiter: str
     decimal: str
     decimal_seen: bool
-    header_row: int
+    rows_above: int
     cells: int
     fields: tuple[Field, ...]
     bytes_per_row: float
@@ -59,7 +60,8 @@ def detect_format(
     """Read the beginning of ``path`` and settle how it is written.
 
     ``label`` is the file's name in messages. Raises ``InputError`` for a missing, empty, binary
-    or UTF-16 file, a header without the required columns, or one that names a column twice.
+    or UTF-16 file, a header without the required columns, or one that names a column twice, and for
+    units below it that are not the columns' own.
     """
     try:
         with path.open("rb") as stream:
@@ -80,6 +82,11 @@ def detect_format(
     header = _split(lines[row], delimiter)
     fields = _fields(label, row + 1, header, spec, mapping, wanted)
     body = [line for line in lines[row + 1 :] if line.strip()]
+    above = row + 1
+    if body:
+        below = lines.index(body[0], above) + 1
+        if is_units_row(label, below, _split(body[0], delimiter), fields):
+            above, body = below, body[1:]
     numbers = [field.position for field in fields if field.name not in TEXT_COLUMNS]
     mark = declared.decimal or _decimal(body, delimiter, numbers)
     width = sum(map(len, body)) / len(body) + 1.0 if body else 1.0
@@ -89,7 +96,7 @@ def detect_format(
         delimiter,
         mark or ".",
         mark is not None,
-        row + 1,
+        above,
         len(header),
         fields,
         width,
@@ -172,7 +179,7 @@ def _fields(
             if name in spec.required or name in mapping:
                 others = [cell for cell in header if cell]
                 spelling = did_you_mean(written, others)
-                role = "" if written == name else f" (for {name})"
+                role = " (or [columns] that say how it is called)" if written == name else f" (for {name})"
                 raise InputError(
                     label,
                     f"the columns {listed(others)}{spelling}",

@@ -145,7 +145,7 @@ class Twin:
     # --- the remainder --------------------------------------------------------------------------------
 
     def _remainder_modes(self) -> list[tuple[int, int, int, float]]:
-        """(half-wave, degree, apart, weight): the 40 heaviest, of mean square one over the span."""
+        """(degree along, in pressure, apart, weight): the 40 heaviest, of mean square one over the span."""
         if self.blueprint.geometry is None or not self.blueprint.options.remainder:
             return []
         degrees = min(6, len(self.blueprint.levels) - 1) + 1
@@ -155,16 +155,13 @@ class Twin:
             for j, d, b in product(range(8), range(degrees), range(sides))
         ]
         every = sorted(every, key=lambda m: -m[3])[:40]
-        power = sum(w * w * (0.5 if j else 1.0) / (2 * d + 1) for j, d, _, w in every)
+        power = sum(w * w / ((2 * j + 1) * (2 * d + 1)) for j, d, _, w in every)
         return [(j, d, b, w / math.sqrt(power)) for j, d, b, w in every]
 
     def remainder_row(self, row: Row) -> list[float]:
-        position = row.x / self.tube.L0 / (1.25 * self.limit)
+        x = min(max(2.0 * row.x / self.tube.L0 / (1.25 * self.limit) - 1.0, -1.0), 1.0)
         P = min(max(2.0 * row.P / self.blueprint.levels[-1] - 1.0, -1.0), 1.0)
-        return [
-            w * math.cos(math.pi * j * position) * _legendre(d, P) * (row.s if b else 1.0)
-            for j, d, b, w in self.modes
-        ]
+        return [w * _legendre(j, x) * _legendre(d, P) * (row.s if b else 1.0) for j, d, b, w in self.modes]
 
     # --- the recordings -------------------------------------------------------------------------------
 

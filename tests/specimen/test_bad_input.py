@@ -177,7 +177,19 @@ CASES: dict[str, tuple[Spoil, list[str]]] = {
     "pascals": (scaled(1, 1e3), ["loops.csv:2:pressure_kPa: ", "pascals", "scale = 0.001"]),
     "metres": (scaled(2, 1e-3), ["loops.csv:displacement_mm: ", "metres", "scale = 1000"]),
     "flipped sign": (scaled(3, -1.0), ["loops.csv:force_N: ", "flipped", "scale = -1.0"]),
-    "flipped displacement": (scaled(2, -1.0), ["loops.csv:displacement_mm: ", "flipped"]),
+    "flipped displacement": (
+        scaled(2, -1.0),
+        ["loops.csv:displacement_mm: found a largest displacement of", "flipped", "scale = -1.0"],
+    ),
+    "lengthening alone": (scaled(2, -0.2), ["loops.csv:displacement_mm: ", "flipped", "scale = -1.0"]),
+    "a units row in bar": (
+        rows(lambda lines: [lines[0], "s,bar,mm,N", *lines[1:]]),
+        ['loops.csv:2:pressure_kPa: found the unit "bar", expected kPa, or scale = 100 for it in'],
+    ),
+    "words below the header": (
+        rows(lambda lines: [lines[0], "s,kPa,mm,foo", *lines[1:]]),
+        ['loops.csv:2:time_s: found "s", expected a number'],
+    ),
     "lengths": (scaled(2, 50.0), ["displacement_mm: ", "a shortening below L0"]),
     "never moves": (scaled(2, 0.0), ["loops.csv:displacement_mm: found a displacement that never moves"]),
     "binary": (raw(b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"), ["loops.csv: found a binary file"]),

@@ -48,6 +48,8 @@ FORMATS: dict[str, bytes] = {
     .replace(",", ";")
     .encode()
     .replace(b"N;", b"N;\xb0C"),
+    "a row of units": PLAIN.replace("\n", "\ns,kPa,mm,N\n", 1).encode(),
+    "units in brackets, below a blank row": PLAIN.replace("\n", "\n\n[s],[kPa],[mm],(N)\n", 1).encode(),
     "rows before the header": b"Rig 7, operator X\nDate;2024-01-01\n\n" + PLAIN.encode(),
 }
 
@@ -62,6 +64,17 @@ def test_every_format_gives_the_same_rows(name: str, tmp_path: Path) -> None:
         [found.time_s, found.pressure_Pa / 1e3, found.displacement_m * 1e3, found.force_N]
     )
     assert columns == pytest.approx(loops().columns(), abs=1e-5)
+
+
+def test_a_unit_that_a_declared_scale_accounts_for(tmp_path: Path) -> None:
+    lines = PLAIN.splitlines()
+    cells = [line.split(",") for line in lines[1:]]
+    bars = [f"{a},{float(b) / 100.0:.8f},{c},{d}" for a, b, c, d in cells]
+    mapping = '\n[columns.loops]\npressure_kPa = { name = "p", scale = 100.0 }\n'
+    text = "\n".join(["time_s,p,displacement_mm,force_N", "s,bar,mm,N", *bars]) + "\n"
+    found = read(make(tmp_path, DECLARATION + mapping, loops=text)).loops
+    assert found is not None
+    assert found.pressure_Pa / 1e3 == pytest.approx(loops().pressure, abs=1e-5)
 
 
 def test_decimal_commas_that_appear_late(tmp_path: Path) -> None:

@@ -24,6 +24,21 @@ def times(column: int, factor: float) -> Change:
     return change
 
 
+def offset(column: int, by: float) -> Change:
+    def change(rows: list[list[str]]) -> None:
+        for row in rows:
+            row[column] = f"{by + float(row[column]):.8g}"
+
+    return change
+
+
+def from_the_other_end(rows: list[list[str]]) -> None:
+    """The crosshead's position counted from where the muscle is shortest."""
+    top = max(float(row[2]) for row in rows)
+    for row in rows:
+        row[2] = f"{top - float(row[2]):.8g}"
+
+
 def blip(rows: list[list[str]]) -> None:
     rows[7][3] = "-9999"
 
@@ -42,7 +57,8 @@ def remarks(folder: Path, change: Change | None = None) -> str:
 
 def test_nothing_is_odd_in_a_plain_test(tmp_path: Path) -> None:
     found = remarks(tmp_path)
-    for words in ("far from", "gas alone", "seconds", "millimetres", "setpoint", "pascals", "bias"):
+    usual = ("seconds", "millimetres", "setpoint", "pascals", "bias")
+    for words in ("far from", "gas alone", "zeroed", "grows with", *usual):
         assert words not in found
 
 
@@ -52,7 +68,11 @@ def test_nothing_is_odd_in_a_plain_test(tmp_path: Path) -> None:
         pytest.param(times(1, 0.01), "while the gas alone pulls about", id="bar"),
         pytest.param(times(3, 1e-3), "while the gas alone pulls about", id="kilonewtons"),
         pytest.param(times(3, 1e3), "while the gas alone pulls about", id="millinewtons"),
-        pytest.param(blip, "a force is far from all others (-9999 N)", id="a missing value's code"),
+        pytest.param(times(1, 10.0), "while the gas alone pulls about", id="millibars"),
+        pytest.param(times(3, 0.101972), "while the gas alone pulls about", id="kilograms-force"),
+        pytest.param(blip, "a force is far from all others (-9999 N at 0.7 s)", id="a missing value's code"),
+        pytest.param(offset(3, -16.0), "every force at 50 kPa is below zero; was the load", id="zero"),
+        pytest.param(from_the_other_end, "the force grows with the contraction at 3 of 3", id="reversed"),
         pytest.param(gust, "50 kPa has a reading far from it (-9999 kPa)", id="the same of a pressure"),
         pytest.param(times(2, 0.1), "is displacement_mm in millimetres", id="centimetres"),
         pytest.param(times(0, 1e3), "a reading every 100 s; is time_s in seconds?", id="milliseconds"),
