@@ -19,6 +19,7 @@ from scipy import linalg
 from mpam_calib.criticism.noise_level import NoiseLevel, noise_level
 from mpam_calib.criticism.rows import Rows, telling_points, telling_strokes
 from mpam_calib.criticism.saturation import along_a_ceiling, saturated
+from mpam_calib.criticism.static_noise import static_noise
 from mpam_calib.criticism.whitening import Axes, Whitening
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
@@ -52,7 +53,7 @@ ALIKE, APART = 0.9, 0.5
 """How alike the rests of two strokes are, and the share of what is left that every bin of a rest has by
 itself: friction fades on the way into a rest, and in it."""
 FORCE_MAP_NOISE = 0.003
-"""Noise of a static reading as a share of the force scale, where no sensor sd is declared."""
+"""Noise of a static reading as a share of the force scale, where no sd is declared and too few tell it."""
 
 SANE = 3.0
 """Prior sds beyond which known moduli are not believed to bend as they say."""
@@ -287,7 +288,8 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     points = gather_points(specimen)
     if points is not None:
         keep, _ = telling_points(points)
-        sd = noise.total if noise else model.setting.force_sd or FORCE_MAP_NOISE * scale
+        told = model.setting.force_sd or static_noise(points, points.level(model.setting.levels), scale)
+        sd = noise.total if noise else told or FORCE_MAP_NOISE * scale
         noise = noise or NoiseLevel(sd, 0.0, 1.0)
         rows_of = points.readings.take(keep)
         parts.append((rows_of, rows_of, points.force[keep], np.full(len(keep), -1), np.zeros(0)))

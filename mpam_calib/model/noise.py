@@ -21,12 +21,14 @@ SHORTEST = 2.0
 """Readings that correlated noise lasts at the least: shorter it would be white."""
 
 
+def white_noise_prior(force_sd: float | None, force_scale: float) -> LogNormal:
+    """Of one reading's sd (N): around the declared one, else around 0.3 % of the force scale."""
+    return LogNormal(0.003 * force_scale, 1.5) if force_sd is None else LogNormal(force_sd, 0.7)
+
+
 def white_noise_parameter(setting: Setting) -> Parameter:
-    """Standard deviation of one reading: around the declared one, else around 0.3 % of the force scale."""
-    if setting.force_sd is not None:
-        prior = LogNormal(setting.force_sd, 0.7)
-    else:
-        prior = LogNormal(0.003 * setting.force_scale, 1.5)
+    """Standard deviation of one reading."""
+    prior = white_noise_prior(setting.force_sd, setting.force_scale)
     return Parameter(WHITE, prior, "sensor noise of one reading, one sigma")
 
 
