@@ -23,20 +23,18 @@ from mpam_calib.specimen.recording import ForceMap, Specimen
 SHARES = np.array([0.25, 0.5, 0.75, 1.0])
 
 
-def map_of(
-    seed: int, noise: float, *, dead: float = 0.0, friction: float = 0.06, points: int = 14
-) -> Specimen:
-    """A force map with both branches, white noise (a share of the top force), and nothing declared of it.
+def map_of(seed: int, noise: float, *, dead: float = 0.0, reach: float = 0.15, points: int = 14) -> Specimen:
+    """A force map with both branches and white noise (a share of the top force), of which nothing is declared.
 
-    ``dead`` is the share of the highest pressure that does no work, which is in no declaration.
+    ``dead`` is the share of the highest pressure that does no work, which is not declared either.
     """
     rng = random.Random(f"map-{seed}")
     muscle, top = loops_muscle(FAMILIES[rng.choice(sorted(FAMILIES))], rng, law="constant", order=2)
     blocked = float(static_force(muscle, top, 0.0)[0])
-    gamma = np.linspace(0.0, 0.15, points)
+    gamma = np.linspace(0.0, reach, points)
     side, P, x = (a.ravel() for a in np.meshgrid([-1, 1], top * SHARES, gamma, indexing="ij"))
     force = static_force(muscle, P - dead * top, x)
-    force = force + friction * np.abs(force) * side
+    force = force + 0.06 * np.abs(force) * side
     force = force + noise * blocked * np.random.default_rng(seed).standard_normal(len(force))
     g, levels = muscle.geometry, 1e3 * top * SHARES
     found = ForceMap(
@@ -66,9 +64,10 @@ def verdict_on(specimen: Specimen) -> Verdict:
 @pytest.mark.parametrize("noise", [0.0005, 0.005, 0.03])
 @pytest.mark.parametrize("dead", [0.0, 0.05])
 def test_noise_is_the_one_that_is_there(noise: float, dead: float) -> None:
+    """Where the muscle pulls; friction that turns over where it begins to push is no smooth curve."""
     ratio = []
     for seed in range(10):
-        specimen = map_of(seed, noise, dead=dead)
+        specimen = map_of(seed, noise, dead=dead, reach=0.1)
         assert specimen.force_map is not None
         top = specimen.force_map.force_N[specimen.force_map.contraction == 0.0].max() / 1.06
         ratio.append(problem_of(specimen).noise_level.total / (noise * top))
