@@ -48,11 +48,10 @@ def static_noise(points: Points, level: NDArray[np.int64], force_scale: float) -
     if sum(len(curve.seen) for curve in curves) < LEAST_SPARE:
         return None
     prior = white_noise_prior(None, force_scale)
-    middle = np.log([prior.median, SIZE * force_scale, LENGTH])
-    width = np.array([prior.log_sd, SIZE_SD, LENGTH_SD])
 
     def badness(z: Array) -> float:
-        noise, size, length = np.exp(middle + width * z)
+        noise, size = float(prior.from_normal(z[0])), SIZE * force_scale * np.exp(SIZE_SD * z[1])
+        length = LENGTH * np.exp(LENGTH_SD * z[2])
         return 0.5 * float(z @ z) - sum(_log_likelihood(curve, noise, size, length) for curve in curves)
 
     # From little noise and from much: a noisy curve and a ragged one are two explanations.
@@ -61,7 +60,7 @@ def static_noise(points: Points, level: NDArray[np.int64], force_scale: float) -
         optimize.minimize(badness, start, method="L-BFGS-B", bounds=[(-MOST, MOST)] * 3) for start in starts
     ]
     best = min(found, key=lambda result: float(result.fun))
-    return float(np.exp(middle[0] + width[0] * best.x[0]))
+    return float(prior.from_normal(best.x[0]))
 
 
 def _curves(points: Points, level: NDArray[np.int64]) -> list[_Curve]:

@@ -17,7 +17,7 @@ from mpam_calib.model.model import Model
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import SMOOTH
 from mpam_calib.posterior.draws import Draws
-from mpam_calib.prediction.curves import LIMIT, STEP, first_root
+from mpam_calib.prediction.curves import GRID, first_root
 from mpam_calib.specimen.declaration import Braid
 from mpam_calib.units import DEG, GPA, MM, si_factor
 
@@ -28,8 +28,6 @@ STRANDS = "braid_stretch"
 STRANDS_FACTOR = "braid_factor"
 STEEPEST, FLATTEST = 89.0 * DEG, 1.0 * DEG
 """No tolerance turns a strand beyond these."""
-GRID = np.arange(round(LIMIT / STEP) + 1, dtype=np.float64) * STEP
-"""Contractions on which the first root is looked for, shape (γ,)."""
 
 
 @dataclass(frozen=True)

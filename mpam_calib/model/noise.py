@@ -19,11 +19,16 @@ WHITE, CORRELATED, TIME = "noise_sd_N", "noise_corr_sd_N", "noise_corr_time_s"
 GROWTH, FREEDOM = "noise_growth", "noise_dof"
 SHORTEST = 2.0
 """Readings that correlated noise lasts at the least: shorter it would be white."""
+NOISELESS = 1e-5
+"""Least noise as a share of the force scale: computed readings have none, and would weigh without bound."""
 
 
 def white_noise_prior(force_sd: float | None, force_scale: float) -> LogNormal:
     """Of one reading's sd (N): around the declared one, else around 0.3 % of the force scale."""
-    return LogNormal(0.003 * force_scale, 1.5) if force_sd is None else LogNormal(force_sd, 0.7)
+    least = NOISELESS * force_scale
+    if force_sd is None:
+        return LogNormal(0.003 * force_scale, 1.5, least)
+    return LogNormal(force_sd, 0.7, min(least, 0.1 * force_sd))
 
 
 def white_noise_parameter(setting: Setting) -> Parameter:

@@ -160,18 +160,20 @@ class NormalWithin:
 
 @dataclass(frozen=True)
 class LogNormal:
-    """ln x ~ N(ln median, log_sd²)."""
+    """ln (x − least) ~ N(ln median, log_sd²); ``least`` is nothing, or next to nothing beside the median."""
 
     median: float
     log_sd: float
+    least: float = 0.0
 
     def from_normal(self, u: Array) -> Array:
-        """median·exp(log_sd·u)."""
-        return self.median * np.exp(self.log_sd * np.clip(u, -40.0, 40.0))
+        """least + median·exp(log_sd·u)."""
+        return self.least + self.median * np.exp(self.log_sd * np.clip(u, -40.0, 40.0))
 
     def to_normal(self, x: Array) -> Array:
-        """ln(x/median)/log_sd."""
-        return np.log(x / self.median) / self.log_sd
+        """ln((x − least)/median)/log_sd."""
+        above = x - self.least if self.least else x
+        return np.log(np.maximum(above, 1e-9 * self.least) / self.median) / self.log_sd
 
     @property
     def sd(self) -> float:
@@ -185,7 +187,7 @@ class LogNormal:
 
     def widened(self, factor: float) -> LogNormal:
         """The same median."""
-        return LogNormal(self.median, factor * self.log_sd)
+        return LogNormal(self.median, factor * self.log_sd, self.least)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,8 @@ NOISE, MISFIT = "tensile_noise_sd_Pa", "tensile_remainder_sd_Pa"
 STRESS_SCALE = 1e6
 """Pa at a strain of one, as the prior's scale: above every silicone rubber of the soft-robotics
 materials database (Marechal et al. 2020, doi 10.1089/soro.2019.0115)."""
+NOISELESS = 1e-6
+"""Least noise as a share of the prior's stress: computed readings have none, and would weigh too much."""
 HALF_WAVES = 12
 GRID_POINTS = 32
 
@@ -56,7 +58,11 @@ class TensileModel:
     def parameters(self) -> tuple[Parameter, ...]:
         """Noise and remainder amplitude, Pa."""
         return (
-            Parameter(NOISE, LogNormal(0.002 * self.scale, 2.0), "noise of one stress reading, one sigma"),
+            Parameter(
+                NOISE,
+                LogNormal(0.002 * self.scale, 2.0, NOISELESS * self.scale),
+                "noise of one stress reading, one sigma",
+            ),
             Parameter(
                 MISFIT,
                 LogNormal(0.005 * self.scale, 2.0),

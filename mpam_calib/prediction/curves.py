@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.model import CONTRACTION_SD, Model
 from mpam_calib.model.readings import Readings
-from mpam_calib.model.reference import geometric_contraction
+from mpam_calib.model.reference import geometric_contraction, rest_of
 from mpam_calib.model.remainder import ROUGH
+from mpam_calib.physics.kinematics import SHAPES
+from mpam_calib.physics.statics import gas_force, thickness_force
 from mpam_calib.posterior.covariance import ROUGH_LENGTH
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.posterior.target import predict_force
@@ -24,6 +26,10 @@ BATCH_CELLS = 400_000
 """Draws × readings evaluated at once: bounds the memory."""
 LIMIT = 0.6
 """Largest contraction that is looked at."""
+GRID = np.arange(round(LIMIT / STEP) + 1, dtype=np.float64) * STEP
+"""Contractions on which the first root is looked for, shape (γ,)."""
+BEYOND = 1.1
+"""Curves are drawn so many times as far as any muscle comes."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +47,17 @@ class Curves:
 
 
 def contraction_grid(model: Model, reach: float) -> Array:
-    """0, 0.005, … a little beyond the braid's geometric limit and the data's reach."""
+    """0, 0.005, … a little beyond the data's reach and where the gas, on braid and wall, stops pulling.
+
+    A bladder that it stretches takes from that pull: the free contraction lies before.
+    """
     assert model.setting is not None
-    last = min(LIMIT, 1.1 * max(geometric_contraction(model.setting.geometry), reach))
-    return np.arange(int(np.ceil(last / STEP)) + 1, dtype=np.float64) * STEP
+    geometry, kinematics = model.setting.geometry, model.setting.simulation.kinematics
+    shape = SHAPES[kinematics](geometry.L0 * (1.0 - GRID), rest_of(geometry))
+    pressure = np.array(model.setting.top_pressure)
+    pull = gas_force(pressure, shape) + thickness_force(pressure, shape)
+    end = max(float(first_root(GRID, pull).max()), geometric_contraction(geometry), reach)
+    return GRID[: int(np.ceil(min(LIMIT, BEYOND * end) / STEP)) + 1]
 
 
 def force_curves(model: Model, draws: Draws, pressures: Array, contractions: Array, seed: int) -> Curves:

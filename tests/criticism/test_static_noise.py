@@ -24,7 +24,7 @@ SHARES = np.array([0.25, 0.5, 0.75, 1.0])
 
 
 def map_of(seed: int, noise: float, *, dead: float = 0.0, reach: float = 0.15, points: int = 14) -> Specimen:
-    """A force map with both branches and white noise (a share of the top force), of which nothing is declared.
+    """A force map with both branches and white noise (a share of the top force), nothing of it declared.
 
     ``dead`` is the share of the highest pressure that does no work, which is not declared either.
     """
