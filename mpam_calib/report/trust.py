@@ -10,6 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from mpam_calib.posterior.convergence import ESS_WANTED, RHAT_LIMIT
 from mpam_calib.report.blocks import Level, Verdict
 from mpam_calib.report.numbers import significant
@@ -26,6 +28,8 @@ HELD: Final = 0.80
 """Least share of a level's readings, predicted from other levels, in bands that should hold 90 % ..."""
 HELD_READINGS: Final = 20
 """... where there are so many; of fewer a fifth may lie outside by chance."""
+NEAR: Final = 0.02
+"""Contraction up to which readings lie near full length, where the blocked force is read."""
 UNIDENTIFIED: Final = 0.20
 """A posterior that is narrower than its prior by less than this share learnt nothing."""
 GAUGE_SHARE: Final = 0.5
@@ -89,7 +93,22 @@ def remainder(view: CalibrationView) -> Limit | None:
         "The bands include this. The command diagnose looks for the cause."
     )
     level: Level = "good" if share <= REMAINDER_CAUTION else "caution" if share <= REMAINDER_BAD else "bad"
+    asked = [words for words in view.warnings if words.endswith("?") or "far from" in words]
+    if level == "bad" and asked:
+        sentence += f" But look at the data first: {'; '.join(asked[:3])}"
     return Limit(level, sentence, f"the simulation is wrong by about {size}")
+
+
+def full_length(view: CalibrationView) -> Limit | None:
+    """Readings near full length miss their bands: so does the blocked force."""
+    share = held_near(view)
+    if share is None or share >= HELD:
+        return None
+    sentence = (
+        f"Do not take the blocked force at its band: near full length {100 * share:.0f} % of the readings "
+        "lie in bands that should hold 90 % of them. The command diagnose looks for the cause."
+    )
+    return Limit("caution", sentence, "near full length the bands miss their readings")
 
 
 def band_width(view: CalibrationView) -> Limit | None:
@@ -227,6 +246,11 @@ CHECKS: tuple[Check, ...] = (
         "the simulation fits to within the noise or half a per cent",
         lambda view: math.isfinite(view.remainder) and math.isfinite(view.noise),
     ),
+    Check(
+        full_length,
+        "the readings near full length lie in their bands",
+        lambda view: held_near(view) is not None,
+    ),
     Check(band_width, f"the bands are within ± {100 * WIDE_CAUTION:.0f} %"),
     Check(extrapolation, "nothing is extrapolated", lambda view: not view.tensile),
     Check(source),
@@ -293,6 +317,22 @@ def _held(view: CalibrationView, extrapolated: bool) -> float | None:
         return None
     rows = rows[rows["extrapolated"].astype(bool) == extrapolated]
     return float(rows["inside90"].mean()) if rows["readings"].sum() >= HELD_READINGS else None
+
+
+def held_near(view: CalibrationView) -> float | None:
+    """Share of the readings near full length in the 90 % bands of new ones; None where they are few."""
+    rows = view.readings("loops", "force_map")
+    rows = rows[(rows["contraction"] <= NEAR) & ~rows["censored"].astype(bool)]
+    bands = view.quantity("force_N_observed")
+    if len(rows) < HELD_READINGS or bands.empty:
+        return None
+    inside = []
+    for (level, branch), here in rows.groupby(["level_kPa", "branch"]):
+        band = bands[(bands["pressure_kPa"] == level) & (bands["branch"] == (branch or "mean"))]
+        if not band.empty:
+            low, high = (np.interp(here["contraction"], band["contraction"], band[q]) for q in ("q05", "q95"))
+            inside.append((here["force_N"] >= low) & (here["force_N"] <= high))
+    return float(np.mean(np.concatenate(inside))) if inside else None
 
 
 def unidentified_names(view: CalibrationView) -> list[str]:

@@ -14,9 +14,9 @@ from mpam_calib.posterior.checkpoint import write_atomically
 from mpam_calib.posterior.material import demand_other, keep_material, material_of
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.report.diagnosis import diagnosis_page
-from mpam_calib.run.files import KEPT_FILE, demand_folder, write_json
+from mpam_calib.run.files import KEPT_FILE, UNFINISHED, demand_folder, write_json
 from mpam_calib.run.folder import run_digest
-from mpam_calib.run.kept import UNFINISHED, Kept
+from mpam_calib.run.kept import Kept
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.specimen.toml_source import SPECIMEN_FILE

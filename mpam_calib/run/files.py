@@ -11,16 +11,25 @@ import pandas as pd
 
 from mpam_calib.errors import InputError
 from mpam_calib.posterior.checkpoint import write_atomically
-from mpam_calib.posterior.stored import RUN_FILE
+from mpam_calib.posterior.stored import POSTERIOR, RUN_FILE
 from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 
 KEPT_FILE = "kept.json"
 """The mark of a finished diagnosis or selection, with the digest of each of its files."""
+CHECKPOINT, UNFINISHED = "checkpoint", "unfinished"
+"""Where a calibration, and a diagnosis or selection, keep what an interruption leaves."""
 OWNERS = {
     SPECIMEN_FILE: "a specimen's folder",
     RUN_FILE: "a calibration's folder",
     KEPT_FILE: "a diagnosis's or selection's folder",
 }
+GENERIC = ("summary.csv", "bands.csv", "report.html")
+"""Results whose names others use as well ..."""
+OURS = (
+    RUN_FILE, KEPT_FILE, POSTERIOR, CHECKPOINT, UNFINISHED,
+    "diagnosis.json", "models.csv", "reproduction.csv",
+)  # fmt: skip
+"""... beside one of which they are ours, finished or not."""
 
 
 def demand_folder(path: Path, *replaces: str) -> None:
@@ -33,6 +42,9 @@ def demand_folder(path: Path, *replaces: str) -> None:
     for name, owner in OWNERS.items():
         if name not in replaces and (path / name).exists():
             raise InputError(path, owner, "one of its own for these results")
+    others = [name for name in GENERIC if (path / name).exists()]
+    if others and not any((path / name).exists() for name in OURS):
+        raise InputError(path / others[0], "a file that no run wrote", "a new folder for these results")
     there = next(folder for folder in (path.absolute(), *path.absolute().parents) if folder.exists())
     if not there.is_dir():
         raise InputError(there, "a file", "a folder to make the run in")

@@ -16,7 +16,7 @@ from mpam_calib.calibration import Calibration
 from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.posterior.checkpoint import Checkpoint, sweep
 from mpam_calib.posterior.stored import POSTERIOR, RUN_FILE, readable, write_draws
-from mpam_calib.run.files import write_csv, write_json
+from mpam_calib.run.files import CHECKPOINT, write_csv, write_json
 from mpam_calib.run.kept import written_over
 
 REPORT = "report.html"
@@ -62,7 +62,7 @@ class RunFolder:
     @property
     def checkpoint(self) -> Checkpoint:
         """Where an unfinished run keeps its blocks."""
-        return Checkpoint(self.path / "checkpoint", self.digest)
+        return Checkpoint(self.path / CHECKPOINT, self.digest)
 
     def state(self) -> dict[str, Any] | None:
         """``run.json`` where it belongs to this digest, else None."""

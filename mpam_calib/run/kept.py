@@ -9,9 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mpam_calib.posterior.checkpoint import Checkpoint
-from mpam_calib.run.files import KEPT_FILE, write_json
-
-UNFINISHED = "unfinished"
+from mpam_calib.run.files import KEPT_FILE, UNFINISHED, write_json
 
 
 def written_over(file: Path) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -86,6 +87,35 @@ def test_remainder(sound: CalibrationView, remainder: float, noise: float, level
     assert (limit.level if limit else None) == level
     if limit:
         assert f"wrong by about {significant(remainder, 2)} N" in limit.sentence
+
+
+def test_a_bad_fit_asks_what_the_reader_asked(sound: CalibrationView) -> None:
+    """Units that are odd stand on the first screen; readings that were left out are no reason."""
+    odd = "loops: forces up to 9 N, while the gas alone pulls about 90 N; are the units right?"
+    warned = replace(sound, warnings=["loops: 4 readings at turns are left out", odd])
+    assert trust.remainder(replace(warned, remainder=3.0)).sentence.find("data first") < 0
+    sentence = trust.remainder(replace(warned, remainder=30.0)).sentence
+    assert sentence.endswith(f"look at the data first: {odd}")
+
+
+@pytest.mark.parametrize(("shift", "told"), [(0.0, False), (1.0, False), (3.0, True)])
+def test_readings_near_full_length(sound: CalibrationView, shift: float, told: bool) -> None:
+    """Readings that are off, by so many sds of their bands, where the blocked force is read."""
+    observed = sound.observed.copy()
+    sd = 0.5 + 0.004 * observed["pressure_kPa"]
+    observed["force_N"] += shift * sd * np.exp(-((observed["contraction"] / 0.02) ** 4))
+    limit = trust.full_length(replace(sound, observed=observed))
+    assert (limit is not None) == told
+    if limit is not None:
+        assert limit.level == "caution"
+        assert "near full length" in limit.sentence
+
+
+def test_few_readings_near_full_length_say_nothing(sound: CalibrationView) -> None:
+    observed = sound.observed[sound.observed["contraction"] > trust.NEAR]
+    verdict = trust.assess(replace(sound, observed=observed))
+    assert trust.held_near(replace(sound, observed=observed)) is None
+    assert not any("full length" in reason for reason in verdict.reasons)
 
 
 def test_an_unassessed_remainder_is_no_good_news(sound: CalibrationView) -> None:

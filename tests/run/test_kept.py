@@ -50,6 +50,25 @@ def test_a_finished_run_is_kept(own_material: Path, own_run: Path, here: Here) -
     assert stamps(own_run) == before
 
 
+@pytest.mark.parametrize("command", ["calibrate", "select", "diagnose", "reproduce"])
+def test_what_others_left_is_not_written_over(
+    own_material: Path, tmp_path: Path, here: Here, command: str
+) -> None:
+    others = tmp_path / "others"
+    others.mkdir()
+    (others / "report.html").write_text("mine")
+    result = here(command, *([] if command == "reproduce" else [own_material]), "-o", others)
+    assert result.code == 2
+    assert "report.html: found a file that no run wrote, expected a new folder" in result.err
+    assert contents(others) == {"report.html": b"mine"}
+
+
+def test_a_run_without_its_mark_is_still_a_run(own_material: Path, own_run: Path, here: Here) -> None:
+    (own_run / "run.json").unlink()
+    assert here("calibrate", own_material, "-o", own_run, *FAST).code in (0, 3)
+    assert state(own_run)
+
+
 def test_a_smaller_budget_keeps_what_has_converged(own_material: Path, own_run: Path, here: Here) -> None:
     before = stamps(own_run)
     assert here("calibrate", own_material, "-o", own_run, "--max-steps", 1).code == 0
