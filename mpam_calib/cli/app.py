@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.metadata import version
 from typing import Any
 
 import typer
@@ -31,6 +32,22 @@ app = typer.Typer(
     # Plain text: readable in a narrow window and in a log.
     rich_markup_mode=None,
 )
+
+
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(version("mpam-calib"))
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: bool = typer.Option(
+        False, "--version", callback=_tell_version, is_eager=True, help="The version."
+    ),
+) -> None:
+    """Options of the program itself."""
+
 
 # Each command's module registers its own on ``app``, and so needs it first.
 for _name in ORDER:

@@ -72,7 +72,7 @@ def _row_blocks(path: Path, label: str, form: TextFormat) -> Iterator[_Lines]:
                 raw, rest = raw + b"\n", b""
             refuse_other_than_text(label, raw)
             count = raw.count(b"\n")
-            lines = _without_blank_rows(raw, row, form.rows_above - row)
+            lines = _without_blank_rows(raw, row, form.rows_above - row, form)
             row += count
             if len(lines.rows):
                 yield lines
@@ -80,8 +80,11 @@ def _row_blocks(path: Path, label: str, form: TextFormat) -> Iterator[_Lines]:
                 return
 
 
-def _without_blank_rows(raw: bytes, before: int, skip: int) -> _Lines:
-    """Drop the first ``skip`` rows and every blank one; ``before`` rows came earlier in the file."""
+def _without_blank_rows(raw: bytes, before: int, skip: int, form: TextFormat) -> _Lines:
+    """Drop the first ``skip`` rows and every blank one; ``before`` rows came earlier in the file.
+
+    A spreadsheet writes a blank row as its delimiters alone.
+    """
     data = np.frombuffer(raw, np.uint8)
     ends = np.flatnonzero(data == _NEWLINE)
     rows = before + 1 + np.arange(len(ends), dtype=np.int64)
@@ -91,10 +94,13 @@ def _without_blank_rows(raw: bytes, before: int, skip: int) -> _Lines:
         rows = rows[skip:]
         ends = ends[skip:] - (len(data) - len(raw))
     lengths = np.diff(ends, prepend=-1) - 1
-    if len(lengths) and lengths.min() < 4:  # only short rows can be blank, unless padded with spaces
-        full = np.array([bool(line.strip()) for line in raw.split(b"\n")[:-1]])
+    blank = b" \t\r" + form.delimiter.encode()
+    # Only short rows can be blank, unless padded with spaces.
+    if len(lengths) and lengths.min() < form.cells + 3:
+        kept = raw.split(b"\n")[:-1]
+        full = np.array([bool(line.strip(blank)) for line in kept])
         if not full.all():
-            raw = b"".join(line + b"\n" for line in raw.split(b"\n") if line.strip())
+            raw = b"".join(line + b"\n" for line, whole in zip(kept, full, strict=True) if whole)
             rows = rows[full]
     return _Lines(raw, rows)
 

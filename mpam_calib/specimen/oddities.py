@@ -12,6 +12,8 @@ from mpam_calib.specimen.recording import Floats, Loops, Specimen
 from mpam_calib.specimen.summary import BRANCH_NAMES, sampling_rates, stroke_speeds
 from mpam_calib.units import KPA, MINUTE, MM
 
+FEW = 30
+"""Readings of loops below which little can be learnt from them."""
 GAP_STEPS = 20.0
 """A pause in the recording is this many times longer than the usual step."""
 WANDER_SHARE = 0.05
@@ -37,6 +39,8 @@ def oddities(specimen: Specimen) -> list[str]:
     remarks = list(specimen.notes)
     loops = specimen.loops
     if loops is not None:
+        if len(loops.force_N) < FEW:
+            remarks.append(f"loops: {len(loops.force_N)} readings; so few hardly contradict any simulation")
         remarks += _odd_times(loops)
         remarks += _odd_speeds(loops)
         remarks += _odd_levels(loops, specimen.levels_Pa)

@@ -57,6 +57,8 @@ def read_toml(path: Path) -> TomlSource:
     """
     file = path / SPECIMEN_FILE if path.is_dir() else path
     expected = f"a specimen folder with its {SPECIMEN_FILE}"
+    if file.is_file() and file.suffix.lower() == ".csv":
+        raise InputError(file, "a data file", expected)
     try:
         raw = file.read_bytes()
     except OSError as error:

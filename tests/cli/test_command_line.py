@@ -181,3 +181,18 @@ def test_a_pipe_sees_nothing(capfd: pytest.CaptureFixture[str]) -> None:
 )
 def test_pressures_include_the_last(text: str, expected: list[float]) -> None:
     assert parse_pressures(text).tolist() == expected
+
+
+def test_the_version_is_told() -> None:
+    import mpam_calib
+
+    assert run("--version").stdout.strip() == mpam_calib.__version__
+
+
+def test_a_data_file_is_no_specimen(tmp_path: Path) -> None:
+    (tmp_path / "loops.csv").write_text("time_s,force_N\n0,1\n")
+    result = run("check", str(tmp_path / "loops.csv"))
+    assert result.returncode == 2
+    assert result.stderr.endswith(
+        "loops.csv: found a data file, expected a specimen folder with its specimen.toml\n"
+    )

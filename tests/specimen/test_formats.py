@@ -48,6 +48,7 @@ FORMATS: dict[str, bytes] = {
     .replace(",", ";")
     .encode()
     .replace(b"N;", b"N;\xb0C"),
+    "a spreadsheet's blank rows": PLAIN.replace("\n", "\n,,,\n", 3).encode() + b",,,\n , , ,\n",
     "a row of units": PLAIN.replace("\n", "\ns,kPa,mm,N\n", 1).encode(),
     "units in brackets, below a blank row": PLAIN.replace("\n", "\n\n[s],[kPa],[mm],(N)\n", 1).encode(),
     "rows before the header": b"Rig 7, operator X\nDate;2024-01-01\n\n" + PLAIN.encode(),

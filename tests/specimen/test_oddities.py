@@ -83,6 +83,13 @@ def test_what_is_hardly_meant_is_said(change: Change, said: str, tmp_path: Path)
     assert said in remarks(tmp_path, change)
 
 
+def test_a_handful_of_readings_is_said_to_be_one(tmp_path: Path) -> None:
+    lines = loops().text().splitlines()
+    few = "\n".join(lines[:13]) + "\n"
+    text = DECLARATION.replace('law = "linear"', 'law = "constant"')
+    assert "loops: 12 readings; so few hardly" in " ".join(oddities(read(make(tmp_path, text, loops=few))))
+
+
 def test_per_cent_of_strain_are_refused(tmp_path: Path) -> None:
     folder = make(tmp_path, '[specimen]\nname = "Rubber"\n[files]\ntensile = "tensile.csv"\n')
     rows = "".join(f"{10.0 * k},{1e4 * k}\n" for k in range(12))
