@@ -25,6 +25,8 @@ SIZE, SIZE_SD = 0.1, 2.0
 """Prior of the curves' departure from a parabola: its median as a share of the force scale, log sd."""
 LENGTH, LENGTH_SD = 0.5, 0.5
 """Prior of the length along which they change, as a share of the largest contraction."""
+CURVES, READINGS = 24, 60
+"""At most so many curves, and readings of each, are looked at."""
 MOST = 5.0
 """Prior sds within which all three are looked for."""
 TINY = 1e-9
@@ -67,12 +69,14 @@ def _curves(points: Points, level: NDArray[np.int64]) -> list[_Curve]:
     rows = np.flatnonzero((points.kind == 0) & ~points.censored)
     if not len(rows):
         return []
+    rows = rows[np.argsort(points.readings.displacement[rows], kind="stable")]
     sides = np.stack([level[rows], points.readings.sign[rows].astype(np.int64)])
     curve = np.unique(sides, axis=1, return_inverse=True)[1].ravel()
     longest = max(float(np.ptp(points.readings.displacement[rows])), 1e-12)
     found = []
-    for number in range(curve.max() + 1):
+    for number in _spread(curve.max() + 1, CURVES):
         here = rows[curve == number]
+        here = here[_spread(len(here), READINGS)]
         x = points.readings.displacement[here] / longest
         columns = np.vander(x, 3)
         P = points.readings.pressure[here]
@@ -83,6 +87,11 @@ def _curves(points: Points, level: NDArray[np.int64]) -> list[_Curve]:
             contrast = linalg.null_space(columns.T)
             found.append(_Curve(np.abs(x[:, None] - x), contrast, contrast.T @ points.force[here]))
     return found
+
+
+def _spread(count: int, most: int) -> NDArray[np.int64]:
+    """Numbers below ``count``: all, or as many as ``most`` of them, evenly."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
 
 
 def _log_likelihood(curve: _Curve, noise: float, size: float, length: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 
 import numpy as np
 import pytest
@@ -81,6 +82,19 @@ def test_a_few_readings_tell_nothing() -> None:
     points = gather_points(specimen)
     assert points is not None
     assert static_noise(points, points.level(specimen.levels_Pa), 100.0) is None
+
+
+def test_a_large_map_is_looked_at_in_part() -> None:
+    """Thirty-two thousand readings, in seconds."""
+    specimen = map_of(1, 0.005, reach=0.1, points=4000)
+    assert specimen.force_map is not None
+    points = gather_points(specimen)
+    assert points is not None
+    start = time.monotonic()
+    found = static_noise(points, points.level(specimen.levels_Pa), 100.0)
+    assert time.monotonic() - start < 20.0
+    blocked = specimen.force_map.force_N[specimen.force_map.contraction == 0.0].max() / 1.06
+    assert found == pytest.approx(0.005 * blocked, rel=0.2)
 
 
 @pytest.mark.parametrize(("seed", "noise"), [(0, 0.002), (1, 0.01)])
