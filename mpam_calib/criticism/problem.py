@@ -288,12 +288,12 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     points = gather_points(specimen)
     if points is not None:
         keep, _ = telling_points(points)
-        told = model.setting.force_sd or static_noise(points, points.level(model.setting.levels), scale)
-        sd = noise.total if noise else told or FORCE_MAP_NOISE * scale
-        noise = noise or NoiseLevel(sd, 0.0, 1.0)
+        if noise is None:
+            told = model.setting.force_sd or static_noise(points, points.level(model.setting.levels), scale)
+            noise = NoiseLevel(told or FORCE_MAP_NOISE * scale, 0.0, 1.0)
         rows_of = points.readings.take(keep)
         parts.append((rows_of, rows_of, points.force[keep], np.full(len(keep), -1), np.zeros(0)))
-        blocks.append(np.diag((sd * grown(np.array(noise.growth), points.force[keep], scale)) ** 2))
+        blocks.append(np.diag((noise.total * grown(np.array(noise.growth), points.force[keep], scale)) ** 2))
         ties.append(np.zeros((len(keep), 2)))
     assert noise is not None
     low = Readings.join([part[0] for part in parts])

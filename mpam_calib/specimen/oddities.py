@@ -44,7 +44,8 @@ def oddities(specimen: Specimen) -> list[str]:
         remarks += _odd_times(loops)
         remarks += _odd_speeds(loops)
         remarks += _odd_levels(loops, specimen.levels_Pa)
-    remarks += _odd_forces(specimen)
+    if specimen.geometry is not None:
+        remarks += _odd_forces(specimen) + _odd_signs(specimen)
     remarks += _odd_contractions(specimen)
     remarks += _odd_stiffness(specimen)
     gauge, top = specimen.sensors.pressure_bias_sd_kPa, float(specimen.levels_Pa.max(initial=0.0)) / KPA
@@ -122,11 +123,10 @@ def _odd_levels(loops: Loops, levels_Pa: Floats) -> list[str]:
 
 
 def _odd_forces(specimen: Specimen) -> list[str]:
-    """Forces far from the gas's or from all others, a zero or a sign that is off."""
-    if specimen.geometry is None:
-        return []
-    geometry, remarks, parts = specimen.geometry, [], _with_contraction(specimen)
-    for name, (pressure, contraction, force) in parts.items():
+    """Forces far from what the gas can pull, and readings far from all others."""
+    assert specimen.geometry is not None
+    geometry, remarks = specimen.geometry, []
+    for name, (pressure, contraction, force) in _with_contraction(specimen).items():
         remarks += _stray_forces(name, specimen, force)
         usual, top = (float(np.quantile(np.abs(x), USUAL_SHARE)) for x in (force, pressure))
         gas = _gas_force(geometry, top, max(float(contraction.min()), 0.0))
@@ -135,14 +135,24 @@ def _odd_forces(specimen: Specimen) -> list[str]:
                 f"{name}: forces up to {usual:.3g} N, while the gas alone pulls about {gas:.3g} N at the "
                 "highest pressure; are the units of force and pressure right, and R0_mm a radius?"
             )
-        level = np.abs(pressure[:, None] - specimen.levels_Pa).argmin(axis=1)
-        below = [specimen.levels_Pa[i] / KPA for i in np.unique(level) if force[level == i].max() < 0.0]
-        if below and specimen.levels_Pa.max() > 0.0:
+    return remarks
+
+
+def _odd_signs(specimen: Specimen) -> list[str]:
+    """A load cell's zero and a contraction's sign that are off."""
+    parts = _with_contraction(specimen)
+    remarks = []
+    for name, part in (("loops", specimen.loops), ("force_map", specimen.force_map)):
+        if part is None:
+            continue
+        contraction, force = parts[name][1:]
+        levels = [part.level == index for index in np.unique(part.level)]
+        below = [float(np.median(part.pressure_Pa[at])) / KPA for at in levels if force[at].max() < 0.0]
+        if below:
             remarks.append(
                 f"{name}: every force at {below[0]:.4g} kPa is below zero; was the load cell zeroed?"
             )
-        here = [(contraction[level == i], force[level == i]) for i in np.unique(level)]
-        rises = [np.cov(x, f)[0, 1] > 0.0 for x, f in here if np.ptp(x) > 0.0]
+        rises = [np.cov(contraction[at], force[at])[0, 1] > 0.0 for at in levels if np.ptp(contraction[at])]
         if rises and np.mean(rises) > 0.5:
             column = "displacement_mm" if name == "loops" else "contraction"
             remarks.append(
