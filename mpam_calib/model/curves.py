@@ -36,9 +36,9 @@ def box_cox(ratio: Array, exponent: Array) -> Array:
     return np.asarray(log * special.exprel(np.clip(exponent * log, -50.0, 50.0)))
 
 
-def settled(time: Array, constant: Array, reference: float) -> Array:
-    """1 − exp(−time/constant), over its value at the reference time."""
-    return np.asarray(np.expm1(-time / constant) / np.expm1(-reference / constant))
+def settled(past: Array, constant: Array, reference: float) -> Array:
+    """1 − exp(−past/constant), of a time or of a pressure, over its value at the reference."""
+    return np.asarray(np.expm1(-past / constant) / np.expm1(-reference / constant))
 
 
 def middle_pressure(setting: Setting) -> float:

@@ -34,7 +34,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
     "braid_kinematics": ("bent", "swell", "thickness", "thin", "section"),
     "braid_angle": ("bent", "seating"),
     "braid_stretch": ("bent", "longer-bent", "power", "longer", "both"),
-    "wall_pressure": ("bent", "thick", "pressed"),
+    "wall_pressure": ("bent", "thick", "pressed", "seated"),
     "length_offset": ("bent", "scale", "line", "slip", "settling", "bedding", "seating", "rezeroed"),
     "strand_friction": ("bent", "power", "even", "pivoting", "contact", "surface", "tension"),
     "coulomb_friction": ("bent", "constant", "capstan", "power"),

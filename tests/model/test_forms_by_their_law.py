@@ -143,15 +143,16 @@ def test_adhesion_is_the_same_along_the_stroke() -> None:
         assert rubbing(form, 0.9, pressure, **values) == pytest.approx(there, rel=1e-9)
 
 
-def test_crossings_that_pivot_do_the_work_of_their_moments() -> None:
-    """Load P·2πRL, the crossings' turn 2dα for the way dL, from the strands' geometry alone."""
-    form, values = "strand_friction:pivoting", {"f_s": 0.3, "strand_exponent": 1.0}
+@pytest.mark.parametrize("exponent", [1.0, 4.0 / 3.0])
+def test_crossings_that_pivot_do_the_work_of_their_moments(exponent: float) -> None:
+    """Moments by the load P·2πRL, the crossings' turn 2dα for the way dL, from the geometry alone."""
+    form, values = "strand_friction:pivoting", {"f_s": 0.3, "strand_exponent": exponent}
     setting, shares = setting_for(form), np.array([0.1, 0.5, 0.9])
     strand = setting.geometry.L0 / np.sin(setting.geometry.alpha0)
     length = setting.geometry.L0 - shares * setting.stroke
     step = 1e-6 * strand
     turn = (np.arcsin((length + step) / strand) - np.arcsin((length - step) / strand)) / step
-    moments = np.sqrt(strand**2 - length**2) * length * turn
+    moments = (np.sqrt(strand**2 - length**2) * length) ** exponent * turn
     found = np.array([rubbing(form, share, setting.top_pressure, **values) for share in shares])
     np.testing.assert_allclose(found / found[1], moments / moments[1], rtol=1e-6)
 
@@ -162,6 +163,14 @@ def test_a_wall_s_share_may_go_with_the_pressure() -> None:
     missing = 1.0 - after.wall_factor
     ratio = before.pressure / before.pressure[..., :1]
     np.testing.assert_allclose(missing, missing[..., :1] * ratio**0.7, rtol=1e-12)
+
+
+def test_a_wall_s_share_may_settle_as_it_seats() -> None:
+    before, after = applied("wall_pressure:seated", wall_factor=0.4, seating_kPa=6e4)
+    missing = np.ravel(1.0 - after.wall_factor)
+    pressure = np.ravel(before.pressure)
+    share = 1.0 - np.exp(-pressure / 6e4)
+    np.testing.assert_allclose(missing / missing[0], share / share[0], rtol=1e-12)
 
 
 @pytest.mark.parametrize("tension", [5e3, 4e4])

@@ -191,6 +191,20 @@ def test_a_form_is_smooth_in_its_shape(form: str) -> None:
         assert np.max(np.abs(far - 2.0 * near + at)) < 0.02 * change + 1e-5
 
 
+@pytest.mark.parametrize("form", SHAPED)
+def test_each_shape_moves_the_force_as_far_as_two_sds(form: str) -> None:
+    """Where one is cut off, a climb that came there would never leave."""
+    (identifier, _, name), setting = form.partition(":"), setting_for(form, "linear")
+    readings, others = rows(setting), drawn(form, setting, 0.5, 0.5)
+    readings = replace(readings, level=np.arange(len(readings)) % len(LEVELS))
+    for parameter in effect(identifier).own[name](setting):
+        places = np.array([[-2.0], [-1.9], [-0.05], [0.05], [1.9], [2.0]])
+        values = {n: np.repeat(v, len(places), axis=0) for n, v in others.items()}
+        found = force(setting, values | {parameter.name: parameter.prior.from_normal(places)}, readings)
+        moved = np.abs(np.diff(found, axis=0)).max(axis=1)[::2]
+        assert np.all(moved > 1e-4 * moved.max()), (parameter.name, moved)
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_a_form_starts_near_the_effect_s_own_equation(form: str) -> None:
     """At its median shape, in the middle of the data: a climb may start from the plain form's size."""

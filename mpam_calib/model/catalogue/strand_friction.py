@@ -56,9 +56,11 @@ def _powers(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _pivoting(state: State, values: Values, setting: Setting) -> State:
-    """Crossed strands that turn on each other: moments at the crossings, whose work goes with P^m·L."""
-    longer = state.length / (state.rest.L0 - 0.5 * setting.stroke)
-    return _even(state, {**values, "f_s": values["f_s"] * longer}, setting)
+    """Crossed strands that turn on each other: moments ∝ (P·RL)^m, turns dα ∝ dL/R."""
+    length = state.rest.L0 - 0.5 * setting.stroke
+    grown = _spread(length, state.rest) / _spread(state.length, state.rest)
+    part = _pressed(state, values, setting) * power(grown, values["strand_exponent"]) * state.length / length
+    return _rubbing(state, values, part)
 
 
 def _pressed(state: State, values: Values, setting: Setting) -> Array:
@@ -141,7 +143,7 @@ register(
             "even": "adhesion ∝ contact area ∝ P^m, m = 2/3 to 1 (Bowden & Tabor 1950; Archard 1957)",
             "pivoting": (
                 "textbook: virtual work of friction moments where crossed strands turn on each other, "
-                "P·2πRL·a·2dα/dL with R ∝ cos α: ∝ P^m·L, m = 1 (Amontons) to 4/3 (Hertz)"
+                "(P·2πRL)^m·2dα/dL with R ∝ cos α: ∝ (P·RL)^m/R, m = 1 (Amontons) to 4/3 (Hertz)"
             ),
             "contact": "friction ∝ pressure × contact area along the stroke (Davis & Caldwell 2006)",
             "surface": "Amontons between bladder and braid, μ·P·2πRL, or another power of either (textbook)",

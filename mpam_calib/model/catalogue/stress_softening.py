@@ -10,7 +10,7 @@ from scipy import special
 
 from mpam_calib.model.curves import level_stroke
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
+from mpam_calib.model.priors import LogNormal, LongTailed, NormalWithin, Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
@@ -72,13 +72,15 @@ def _by_cycle(fading: Fading, over_test: bool = False) -> Share:
 
 def _recovering(state: State, values: Values, setting: Setting) -> Array:
     """A part of what has softened recovers before each level, the rest stays soft for the whole test."""
-    share, cycles = np.clip(values["softening_recovers"], 0.0, 1.0), values["softening_cycles"]
+    share, cycles = values["softening_recovers"], values["softening_cycles"]
     anew, once = (np.exp((1.0 - n) / cycles) for n in (state.readings.cycle, state.readings.test_cycle))
     return np.asarray(share * anew + (1.0 - share) * once)
 
 
 def _recovery(setting: Setting) -> tuple[Parameter, ...]:
-    share = Parameter("softening_recovers", Normal(0.5, 0.4), "share that recovers before a level", "", "")
+    # A climb would never leave a bound that cuts the share off: beyond it nothing moves the force.
+    within = NormalWithin(0.5, 0.4, 0.0, 1.0)
+    share = Parameter("softening_recovers", within, "share that recovers before a level", "", "")
     cycles = Parameter("softening_cycles", LogNormal(1.2, 0.6), "cycles in which it softens", "", "")
     return share, cycles
 

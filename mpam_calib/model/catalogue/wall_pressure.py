@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mpam_calib.model.curves import middle_pressure, middle_shape, power
+from mpam_calib.model.curves import middle_pressure, middle_shape, power, settled
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, Normal, Parameter
 from mpam_calib.model.state import Setting, State
@@ -43,6 +43,17 @@ def _pressure_exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("wall_exponent", Normal(0.0, 0.5), "power of the pressure", "textbook", ""),)
 
 
+def _seated(state: State, values: Values, setting: Setting) -> State:
+    """A wall that hands its pressure on to the braid as it seats against it: the share settles at one."""
+    part = settled(state.pressure, values["seating_kPa"], middle_pressure(setting))
+    return _apply(state, {**values, "wall_factor": values["wall_factor"] * part}, setting)
+
+
+def _seating(setting: Setting) -> tuple[Parameter, ...]:
+    prior = LogNormal(0.5 * middle_pressure(setting), 0.7)
+    return (Parameter("seating_kPa", prior, "pressure over which the wall seats"),)
+
+
 register(
     Effect(
         id="wall_pressure",
@@ -54,11 +65,12 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"thick": _thick, "pressed": _pressed},
-        own={"thick": _exponent, "pressed": _pressure_exponent},
+        forms={"thick": _thick, "pressed": _pressed, "seated": _seated},
+        own={"thick": _exponent, "pressed": _pressure_exponent, "seated": _seating},
         sources={
             "thick": "thick-walled cylinder: the stress's fall across the wall ∝ t/R (Lamé 1852)",
             "pressed": "textbook: a share that goes with a power of the pressure, f·(P/P_middle)^m",
+            "seated": "textbook: a share that settles as the wall seats, 1 − exp(−P/P_seat)",
         },
         bends={"contraction": 2, "pressure": 2},
     )
