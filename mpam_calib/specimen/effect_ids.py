@@ -67,7 +67,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
         *("saturating", "loss", "speed", "lagging", "play", "throttle", "volume", "reservoir", "refill"),
     ),
     "rig_compliance": ("bent", "power", "toe", "preload"),
-    "law_shape": ("bent", "exponential"),
+    "law_shape": ("bent", "exponential", "power"),
     "order_too_low": ("bent", "line", "steady", "steady-bent", "fung", "fitted", "gent"),
 }
 """Other forms of the effects, declared as ``id:form``."""

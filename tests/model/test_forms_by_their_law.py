@@ -173,6 +173,13 @@ def test_a_wall_s_share_may_settle_as_it_seats() -> None:
     np.testing.assert_allclose(missing / missing[0], share / share[0], rtol=1e-12)
 
 
+@pytest.mark.parametrize("exponent", [0.5, 2.0])
+def test_a_law_may_bend_by_a_power_of_the_pressure(exponent: float) -> None:
+    before, after = applied("law_shape:power", law_bend_1=0.3, law_exponent=exponent)
+    bend, pressure = np.ravel(after.wall_gain) - 1.0, np.ravel(before.pressure)
+    np.testing.assert_allclose(bend / bend[0], (pressure / pressure[0]) ** exponent, rtol=1e-12)
+
+
 @pytest.mark.parametrize("tension", [5e3, 4e4])
 def test_strands_under_the_sleeve_s_tension_rub_as_under_more_pressure(tension: float) -> None:
     """Friction ∝ (P + P0)^(4/3) at one place, whatever the level; without tension it is Eq. 2.43."""

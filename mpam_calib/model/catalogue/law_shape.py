@@ -7,8 +7,9 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy import special
 
+from mpam_calib.model.curves import middle_pressure, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import LongTailed, Normal, Parameter
+from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
@@ -83,6 +84,20 @@ def _curvature(setting: Setting) -> tuple[Parameter, ...]:
     return (*_level(setting), curvature)
 
 
+def _power(state: State, values: Values, setting: Setting) -> State:
+    """As declared at no pressure, and from there on more by a power of the pressure."""
+    if not (degrees := _degrees(setting)):
+        return state
+    part = power(state.readings.pressure / middle_pressure(setting), values["law_exponent"])
+    return state._replace(wall_gain=state.wall_gain * (1.0 + values[f"law_bend_{degrees[0]}"] * part))
+
+
+def _exponent(setting: Setting) -> tuple[Parameter, ...]:
+    if not _degrees(setting):
+        return ()
+    return (Parameter("law_exponent", LogNormal(1.2, 0.6), "power of the pressure", "textbook", ""),)
+
+
 register(
     Effect(
         id="law_shape",
@@ -94,10 +109,13 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"exponential": _exponential},
-        own={"exponential": _curvature},
-        leading={"exponential": 1},
-        sources={"exponential": "a + b·P + c·exp(dP): thesis Eq. 4.8, saturating or growing"},
+        forms={"exponential": _exponential, "power": _power},
+        own={"exponential": _curvature, "power": _exponent},
+        leading={"exponential": 1, "power": 1},
+        sources={
+            "exponential": "a + b·P + c·exp(dP): thesis Eq. 4.8, saturating or growing",
+            "power": "textbook: E_k·(1 + c·P^m), quadratic, a root or between",
+        },
         bends={"contraction": 2},
     )
 )
