@@ -286,6 +286,16 @@ def test_what_recovers_softens_anew_and_the_rest_stays(form: str, recovers: floa
     np.testing.assert_allclose(left, 0.3 * np.exp((1.0 - before.readings.cycle) / 2.5))
 
 
+@pytest.mark.parametrize("form", ["growing", "force-growing"])
+def test_softening_may_grow_with_the_stretch(form: str) -> None:
+    """The ends of the stroke differ by the growth, every cycle by the same factor."""
+    values = {"first_cycle_fraction": 0.2, "softening_growth": 1.2, "softening_cycles": 1.5}
+    before, after = applied(f"stress_softening:{form}", **values)
+    left = np.ravel(after.gain * after.wall_gain - 1.0) * np.exp((before.readings.cycle - 1.0) / 1.5)
+    along = np.ravel(before.displacement) / before.displacement.max()
+    np.testing.assert_allclose(np.polynomial.polynomial.polyfit(along, left, 1), [0.08, 0.24], rtol=1e-9)
+
+
 def test_grips_bed_in_with_each_cycle() -> None:
     own = {"offset_mm": 2e-3, "offset_excess": -0.6, "bedding_cycles": 3.0}
     before, after = applied("length_offset:bedding", **own)

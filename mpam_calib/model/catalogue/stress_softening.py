@@ -10,7 +10,7 @@ from scipy import special
 
 from mpam_calib.model.curves import level_stroke
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import LogNormal, LongTailed, NormalWithin, Parameter
+from mpam_calib.model.priors import LogNormal, LongTailed, Normal, NormalWithin, Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
@@ -23,6 +23,7 @@ Fading = Callable[[Array, Values], Array]
 POWERS = ("power", "force-power", "test-power", "test-force-power")
 REACHING = ("virgin", "fresh", "test-virgin", "test-force-virgin")
 FADING = ("virgin-fading", "force-fading")
+GROWING = ("growing", "force-growing")
 RECOVERING = ("recovering", "force-recovering")
 
 
@@ -81,8 +82,11 @@ def _recovery(setting: Setting) -> tuple[Parameter, ...]:
     # A climb would never leave a bound that cuts the share off: beyond it nothing moves the force.
     within = NormalWithin(0.5, 0.4, 0.0, 1.0)
     share = Parameter("softening_recovers", within, "share that recovers before a level", "", "")
-    cycles = Parameter("softening_cycles", LogNormal(1.2, 0.6), "cycles in which it softens", "", "")
-    return share, cycles
+    return share, _cycles()
+
+
+def _cycles() -> Parameter:
+    return Parameter("softening_cycles", LogNormal(1.2, 0.6), "cycles in which it softens", "", "")
 
 
 def _by_stretch(fading: Fading, over_test: bool = False) -> Share:
@@ -94,6 +98,17 @@ def _by_stretch(fading: Fading, over_test: bool = False) -> Share:
         return np.asarray(near * fading(state.readings.cycle, values))
 
     return share
+
+
+def _growing(state: State, values: Values, setting: Setting) -> Array:
+    """The more, the farther the bladder is stretched: as much as the plain form's at half the stroke."""
+    along = 1.0 + values["softening_growth"] * (state.displacement / setting.stroke - 0.5)
+    return np.asarray(along * np.exp((1.0 - state.readings.cycle) / values["softening_cycles"]))
+
+
+def _growth(setting: Setting) -> tuple[Parameter, ...]:
+    growth = Parameter("softening_growth", Normal(0.8, 0.5), "growth from half of the stroke to 3/2", "", "")
+    return growth, _cycles()
 
 
 def _fresh(state: State, values: Values, setting: Setting) -> Array:
@@ -163,6 +178,8 @@ register(
             "force-fading": _muscle(_by_stretch(_power)),
             "fresh": _bladder(_fresh),
             "path": _bladder(_path),
+            "growing": _bladder(_growing),
+            "force-growing": _muscle(_growing),
             "recovering": _bladder(_recovering),
             "force-recovering": _muscle(_recovering),
             "test-virgin": _bladder(_by_stretch(_constant, over_test=True)),
@@ -172,6 +189,7 @@ register(
         | dict.fromkeys(REACHING, _reach)
         | dict.fromkeys(FADING, _reach_and_exponent)
         | dict.fromkeys(RECOVERING, _recovery)
+        | dict.fromkeys(GROWING, _growth)
         | {"path": _strokes},
         apart=("virgin-fading", "force-recovering"),
         sources=dict.fromkeys(POWERS, "textbook: power of the cycle count (steep: the first cycle alone)")
@@ -180,6 +198,7 @@ register(
             "Ogden & Roxburgh 1999, with the distance to the longest stroke in place of energies",
         )
         | dict.fromkeys(RECOVERING, "softening of which a part recovers at rest (Diani et al. 2009)")
+        | dict.fromkeys(GROWING, "textbook: the more the farther it is stretched, less with every cycle")
         | {"path": "continuous damage: e^(−way/s) (Miehe 1995, Eur. J. Mech. A 14)"},
         kinds={
             "force": "here the whole muscle, not the bladder alone",
