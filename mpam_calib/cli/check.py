@@ -115,7 +115,9 @@ def _missing(specimen: Specimen) -> list[str]:
     if specimen.tensile is None and specimen.simulation.moduli == "loops" and specimen.has_muscle_data:
         missing.append("tensile: the material's own test would separate moduli from static effects")
     if specimen.braid is None and specimen.geometry is not None:
-        missing.append("[braid]: braid_stretch and strand friction cannot be used")
+        missing.append(
+            "[braid]: braid_stretch and strand friction cannot be declared, and have no size in diagnose"
+        )
     if specimen.geometry is not None and specimen.sensors.force_sd_N is None:
         missing.append("[sensors] force_sd_N: the noise is estimated from the data alone")
     return missing

@@ -20,10 +20,12 @@ from mpam_calib.criticism.search import search
 from mpam_calib.criticism.searched import LARGEST, Search
 from mpam_calib.criticism.sizes import Sizes, sizes_of
 from mpam_calib.criticism.structure import Structure, structure_tests
+from mpam_calib.criticism.usual_braid import SHAPE_ALONE, need_strands, with_strands
 from mpam_calib.criticism.verdict import Verdict, judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
 from mpam_calib.model.effect import effect
+from mpam_calib.specimen.declaration import Braid
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import si_factor
 
@@ -48,11 +50,25 @@ class Diagnosis:
     """How large each further effect could be unseen (SI), where nothing is left that would pass for it."""
     sizes: Sizes
     """Those of the causes."""
+    assumed_braid: Braid | None
+    """The usual strands that were taken for those of a missing [braid]."""
 
     @property
     def causes(self) -> list[str]:
         """The causes that are reported, the most probable first."""
         return sorted(self.verdict.standing, key=lambda e: (-self.verdict.marginals[e], e))
+
+    @property
+    def leans_on_assumed_braid(self) -> bool:
+        """Whether the size of a cause is stated for strands that nobody declared."""
+        return self.assumed_braid is not None and bool(need_strands(tuple(self.causes)))
+
+    @property
+    def not_tested(self) -> list[tuple[str, str]]:
+        """(id, why) of the effects that these data cannot speak of, or not by their size."""
+        by_shape = need_strands(self.candidates.tested) if self.assumed_braid is not None else ()
+        absent = [(e, SHAPE_ALONE) for e in by_shape if e not in self.causes]
+        return sorted([*self.candidates.not_tested, *absent])
 
     @property
     def declared_forms(self) -> tuple[str, ...]:
@@ -75,7 +91,8 @@ def diagnose(
     if not (specimen.loops is not None or specimen.force_map is not None):
         raise InputError(specimen.folder / "specimen.toml", "no loops and no force map", "one to diagnose")
     listener = tell or (lambda stage, share: None)
-    blueprint = draw_blueprint(specimen, Options(nuisances=False, remainder=False), material)
+    blueprint = with_strands(draw_blueprint(specimen, Options(nuisances=False, remainder=False), material))
+    assumed = blueprint.braid if specimen.braid is None else None
     problem = build_problem(specimen, blueprint)
     tested = candidates(problem)
     found = search(problem, tested.tested, partial(listener, "searching"), workers=WORKERS, journal=journal)
@@ -98,9 +115,10 @@ def diagnose(
     limits = {}
     if verdict.word in ("adequate", "named"):
         with journalled(problem, WORKERS, journal) as spread:
-            limits = hidden_sizes(problem, tested.tested, fits[1], spread)
+            told = tuple(e for e in tested.tested if assumed is None or not effect(e).needs_braid)
+            limits = hidden_sizes(problem, told, fits[1], spread)
     sizes = sizes_of(found, verdict.standing)
-    return Diagnosis(problem, tested, found, verdict, budget, gain, structure, limits, sizes)
+    return Diagnosis(problem, tested, found, verdict, budget, gain, structure, limits, sizes, assumed)
 
 
 def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
@@ -110,7 +128,10 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "verdict": verdict.word,
         "causes": [_cause(diagnosis, e, seed) for e in diagnosis.causes],
         "alternatives": [{"ids": sorted(s), "probability": _round(p)} for s, p in verdict.others().items()],
-        "not_tested": [{"id": i, "why": why} for i, why in diagnosis.candidates.not_tested],
+        "not_tested": [{"id": i, "why": why} for i, why in diagnosis.not_tested],
+        "assumed_braid": diagnosis.assumed_braid.model_dump()
+        if diagnosis.assumed_braid is not None and diagnosis.leans_on_assumed_braid
+        else None,
         "limits": [_limit(diagnosis, e) for e in sorted(diagnosis.limits)],
         "noise_N": _round(budget.noise),
         "misfit_before_N": _round(budget.before),

@@ -81,7 +81,8 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
             ]
         ),
     ]
-    lead += [Notice(text) for text in (*_unproven(content), *wording.left_aside(specimen, "search"))]
+    notices = (*_assumed(content), *_unproven(content), *wording.left_aside(specimen, "search"))
+    lead += [Notice(text) for text in notices]
     sections = [
         Section("Misfit budget", _budget(found, content)),
         Section("Where the misfit shows", _structure(content)),
@@ -117,6 +118,19 @@ def _reasons(content: dict[str, Any]) -> list[str]:
         if c["within_declared_uncertainty"]
     ]
     return reasons
+
+
+def _assumed(content: dict[str, Any]) -> list[str]:
+    """What is to be known of a cause whose size goes with strands that nobody declared."""
+    if (braid := content["assumed_braid"]) is None:
+        return []
+    titles = [effect(c["id"]).title.lower() for c in content["causes"] if effect(c["id"]).needs_braid]
+    strands = f"{braid['n']} nylon strands of {braid['R_br_mm']:g} mm radius and {braid['E_br_GPa']:g} GPa"
+    return [
+        f"specimen.toml has no [braid]. That there is {' and '.join(titles)} is told by how the force goes "
+        f"with pressure and contraction; its size is stated for {strands}, and is another for others. "
+        "Declare your sleeve to have its size."
+    ]
 
 
 def _unproven(content: dict[str, Any]) -> list[str]:

@@ -63,11 +63,11 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
         *("early", "power", "root", "thermal", "return", "swing"),
     ),
     "pressure_droop": (
-        *("bent", "level", "level-bent", "power", "level-power"),
+        *("bent", "level", "level-bent", "power", "level-power", "square"),
         *("saturating", "loss", "speed", "lagging", "play", "throttle", "volume", "reservoir", "refill"),
     ),
     "rig_compliance": ("bent", "power", "toe", "preload"),
-    "law_shape": ("bent", "exponential", "power"),
+    "law_shape": ("bent", "exponential", "power", "line"),
     "order_too_low": ("bent", "line", "steady", "steady-bent", "fung", "fitted", "gent"),
 }
 """Other forms of the effects, declared as ``id:form``."""

@@ -29,6 +29,7 @@ from mpam_calib.criticism.problem import build_problem
 from mpam_calib.criticism.search import search
 from mpam_calib.criticism.searched import Search
 from mpam_calib.criticism.sizes import sizes_of
+from mpam_calib.criticism.usual_braid import with_strands
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Options, draw_blueprint
@@ -95,7 +96,8 @@ def score_case(recipe: recipes.Recipe, which: str = "") -> Scored:
             return Scored(
                 one.name, one.group, truth, one.outside is not None, "refused", frozenset(), (), 0.0
             )
-    problem = build_problem(specimen, draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
+    blueprint = with_strands(draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
+    problem = build_problem(specimen, blueprint)
     found = search(problem, candidates(problem).tested)
     verdict = judge(found)
     truth = frozenset(one.ids)

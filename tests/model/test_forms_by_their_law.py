@@ -173,6 +173,19 @@ def test_a_wall_s_share_may_settle_as_it_seats() -> None:
     np.testing.assert_allclose(missing / missing[0], share / share[0], rtol=1e-12)
 
 
+def test_a_law_may_bend_in_proportion_to_the_pressure() -> None:
+    before, after = applied("law_shape:line", law_bend_1=0.3)
+    bend, pressure = np.ravel(after.wall_gain) - 1.0, np.ravel(before.pressure)
+    np.testing.assert_allclose(bend / bend[0], pressure / pressure[0], rtol=1e-12)
+
+
+def test_a_supply_may_lose_with_the_square_of_the_stroke() -> None:
+    before, after = applied("pressure_droop:square", droop_percent=0.1)
+    lost = np.ravel(1.0 - after.pressure / before.pressure)
+    place = np.ravel(before.displacement) / before.displacement.max()
+    np.testing.assert_allclose(lost, 0.1 * place * np.abs(place), atol=1e-15)
+
+
 @pytest.mark.parametrize("exponent", [0.5, 2.0])
 def test_a_law_may_bend_by_a_power_of_the_pressure(exponent: float) -> None:
     before, after = applied("law_shape:power", law_bend_1=0.3, law_exponent=exponent)

@@ -31,8 +31,8 @@ AWAY = {
     "law_shape": {"pressure": 1e3 * LEVELS[-1]},
     # Half-way a fit to all strains may leave nothing; most it leaves beyond them.
     "order_too_low": {"displacement": 0.011},
-    # After a turn a supply has hardly anything to refill.
-    "pressure_droop": {"travel": 5e-3},
+    # After a turn a supply has hardly anything to refill; a droop is stated for full stroke.
+    "pressure_droop": {"travel": 5e-3, "displacement": 5.5e-3},
 }
 
 

@@ -92,6 +92,11 @@ def _power(state: State, values: Values, setting: Setting) -> State:
     return state._replace(wall_gain=state.wall_gain * (1.0 + values[f"law_bend_{degrees[0]}"] * part))
 
 
+def _line(state: State, values: Values, setting: Setting) -> State:
+    """In proportion to the pressure."""
+    return _power(state, {**values, "law_exponent": np.ones((1, 1))}, setting)
+
+
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
     if not _degrees(setting):
         return ()
@@ -109,12 +114,13 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
-        forms={"exponential": _exponential, "power": _power},
+        forms={"exponential": _exponential, "power": _power, "line": _line},
         own={"exponential": _curvature, "power": _exponent},
-        leading={"exponential": 1, "power": 1},
+        leading={"exponential": 1, "power": 1, "line": 1},
         sources={
             "exponential": "a + b·P + c·exp(dP): thesis Eq. 4.8, saturating or growing",
             "power": "textbook: E_k·(1 + c·P^m), quadratic, a root or between",
+            "line": "E_k·(1 + c·P), as the thesis's linear law of pressure but for all moduli alike",
         },
         bends={"contraction": 2},
     )

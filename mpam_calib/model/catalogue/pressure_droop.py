@@ -48,6 +48,12 @@ def _power(state: State, values: Values, setting: Setting) -> State:
     return _drooped(state, values, part)
 
 
+def _square(state: State, values: Values, setting: Setting) -> State:
+    """With the square of the stroke."""
+    place = state.displacement / setting.stroke
+    return _drooped(state, values, place * np.abs(place))
+
+
 def _level_power(state: State, values: Values, setting: Setting) -> State:
     """A power of each level's own stroke."""
     part = signed_power(state.displacement / level_stroke(state, setting), values["droop_exponent"])
@@ -202,6 +208,7 @@ register(
         forms={
             "level": _level,
             "power": _power,
+            "square": _square,
             "level-power": _level_power,
             "saturating": _saturating,
             "loss": _loss,
@@ -219,7 +226,8 @@ register(
         | {"saturating": _steepness, "play": _play_way, "throttle": _vented},
         recalls=("speed", "lagging", "play", "throttle", "volume", "refill"),
         sources={
-            "power": "textbook: quadratic in the stroke; near 0.8 in proportion to the muscle's volume",
+            "power": "textbook: a power of the stroke; near 0.8 in proportion to the muscle's volume",
+            "square": "textbook: quadratic in the stroke",
             "level-power": "the same over each level's own stroke",
             "saturating": "textbook: exponential approach to a new balance, 1 − exp(−k·x), over the stroke",
             "loss": "textbook: a loss that is the same at every pressure, or goes with its root (orifice)",
