@@ -6,7 +6,7 @@ from math import log
 
 from mpam_calib.model.effect import effect
 
-FORM_SHARES = (0.5, 0.4, 0.1)
+FORM_SHARES = (0.5, 0.47, 0.03)
 """Prior shares of an effect's forms: its equation as it is written, other equations for it, bent ones. A
 rival that must bend in all its parts is not to come close to causes that follow an equation."""
 
