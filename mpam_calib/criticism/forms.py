@@ -8,7 +8,8 @@ from mpam_calib.model.effect import effect
 
 FORM_SHARES = (0.5, 0.47, 0.03)
 """Prior shares of an effect's forms: its equation as it is written, other equations for it, bent ones. A
-rival that must bend in all its parts is not to come close to causes that follow an equation."""
+rival that must bend in all its parts is not to come close to causes that follow an equation. Of the causes
+of five rigs that others wrote a tenth bent, but as a share it let more rivals come near than truths."""
 
 
 def flexible(identifier: str) -> tuple[str, ...]:
