@@ -59,9 +59,9 @@ class Diagnosis:
         return sorted(self.verdict.standing, key=lambda e: (-self.verdict.marginals[e], e))
 
     @property
-    def leans_on_assumed_braid(self) -> bool:
-        """Whether the size of a cause is stated for strands that nobody declared."""
-        return self.assumed_braid is not None and bool(need_strands(tuple(self.causes)))
+    def leant_on(self) -> Braid | None:
+        """The assumed strands, where the size of a cause is stated for them."""
+        return self.assumed_braid if need_strands(tuple(self.causes)) else None
 
     @property
     def not_tested(self) -> list[tuple[str, str]]:
@@ -115,7 +115,8 @@ def diagnose(
     limits = {}
     if verdict.word in ("adequate", "named"):
         with journalled(problem, WORKERS, journal) as spread:
-            told = tuple(e for e in tested.tested if assumed is None or not effect(e).needs_braid)
+            without_size = need_strands(tested.tested) if assumed is not None else ()
+            told = tuple(e for e in tested.tested if e not in without_size)
             limits = hidden_sizes(problem, told, fits[1], spread)
     sizes = sizes_of(found, verdict.standing)
     return Diagnosis(problem, tested, found, verdict, budget, gain, structure, limits, sizes, assumed)
@@ -129,9 +130,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "causes": [_cause(diagnosis, e, seed) for e in diagnosis.causes],
         "alternatives": [{"ids": sorted(s), "probability": _round(p)} for s, p in verdict.others().items()],
         "not_tested": [{"id": i, "why": why} for i, why in diagnosis.not_tested],
-        "assumed_braid": diagnosis.assumed_braid.model_dump()
-        if diagnosis.assumed_braid is not None and diagnosis.leans_on_assumed_braid
-        else None,
+        "assumed_braid": None if diagnosis.leant_on is None else diagnosis.leant_on.model_dump(),
         "limits": [_limit(diagnosis, e) for e in sorted(diagnosis.limits)],
         "noise_N": _round(budget.noise),
         "misfit_before_N": _round(budget.before),

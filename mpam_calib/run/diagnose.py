@@ -70,10 +70,10 @@ def write_extended(found: Diagnosis, specimen: Specimen, toml: Path, folder: Pat
     document = tomlkit.parse(toml.read_text(encoding="utf-8-sig"))
     simulation = document.setdefault("simulation", tomlkit.table())
     simulation["effects"] = list(extended_effects(found))
-    if found.assumed_braid is not None and found.leans_on_assumed_braid:
+    if found.leant_on is not None:
         strands = tomlkit.table()
         strands.add(tomlkit.comment("assumed, not measured: what needs it has its size for these strands"))
-        for key, value in found.assumed_braid.model_dump().items():
+        for key, value in found.leant_on.model_dump().items():
             strands.add(key, value)
         document["braid"] = strands
     keep_material(document, specimen, folder)
