@@ -107,7 +107,7 @@ def _growing(state: State, values: Values, setting: Setting) -> Array:
 
 
 def _growth(setting: Setting) -> tuple[Parameter, ...]:
-    growth = Parameter("softening_growth", Normal(0.8, 0.5), "growth from half of the stroke to 3/2", "", "")
+    growth = Parameter("softening_growth", Normal(0.8, 0.5), "how much it grows along the stroke", "", "")
     return growth, _cycles()
 
 

@@ -44,7 +44,7 @@ def _pressure_exponent(setting: Setting) -> tuple[Parameter, ...]:
 
 
 def _seated(state: State, values: Values, setting: Setting) -> State:
-    """A wall that hands its pressure on to the braid as it seats against it: the share settles at one."""
+    """A wall that hands its pressure on to the braid as it seats against it."""
     part = settled(state.pressure, values["seating_kPa"], middle_pressure(setting))
     return _apply(state, {**values, "wall_factor": values["wall_factor"] * part}, setting)
 
