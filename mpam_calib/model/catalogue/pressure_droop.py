@@ -50,8 +50,7 @@ def _power(state: State, values: Values, setting: Setting) -> State:
 
 def _square(state: State, values: Values, setting: Setting) -> State:
     """With the square of the stroke."""
-    place = state.displacement / setting.stroke
-    return _drooped(state, values, place * np.abs(place))
+    return _power(state, {**values, "droop_exponent": np.full((1, 1), 2.0)}, setting)
 
 
 def _level_power(state: State, values: Values, setting: Setting) -> State:
