@@ -26,6 +26,7 @@ from mpam_calib.criticism.folds import folds_of
 from mpam_calib.criticism.gain import measure_gain
 from mpam_calib.criticism.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.search import search
+from mpam_calib.criticism.usual_braid import with_strands
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Options, draw_blueprint
@@ -41,7 +42,8 @@ FIELDS = [
 
 def problem_of(specimen: Specimen) -> Problem:
     """The reduced rows of a specimen."""
-    return build_problem(specimen, draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
+    blueprint = with_strands(draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
+    return build_problem(specimen, blueprint)
 
 
 def oracle_rmse(recording: rig_case.Recording, specimen: Specimen, problem: Problem, by_cycle: bool) -> float:
