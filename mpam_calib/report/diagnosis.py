@@ -14,7 +14,7 @@ from mpam_calib.model.effect import effect
 from mpam_calib.model.priors import Parameter
 from mpam_calib.report import wording
 from mpam_calib.report.figures import misfit
-from mpam_calib.report.numbers import probability, significant
+from mpam_calib.report.numbers import probability, significant, with_band
 from mpam_calib.report.page import (
     Block,
     DataTable,
@@ -51,7 +51,6 @@ COVERED = 0.75
 SETTLED = 0.95
 """Probability above which a cause's equation is not said to be open."""
 
-NO_SIZE = {"mean": np.nan, "q05": np.nan, "q95": np.nan}
 
 FORMS = (
     "These probabilities suppose that a rig's effects follow the catalogue's equations, bent ones too, "
@@ -231,23 +230,26 @@ def _parameters(found: Diagnosis) -> dict[str, Parameter]:
 def _causes(causes: list[dict[str, Any]], parameters: dict[str, Parameter]) -> list[Block]:
     if not causes:
         return [Text("None is named.")]
-    rows = [
+    named = [
         {
-            "cause": "" if number else effect(c["id"]).title,
-            "what it means": parameters[name].meaning if number else _meaning(c["id"], c["form"]),
-            "probability": "" if number else probability(c["probability"]),
-            "parameter": name,
-            "mean": values["mean"],
-            "5 %": values["q05"],
-            "95 %": values["q95"],
-            "unit": parameters[name].printed_unit if name else "",
-            "share of misfit": "" if number else f"{c['share_of_misfit']:.3g}",
+            "cause": effect(c["id"]).title,
+            "probability": probability(c["probability"]),
+            "share of misfit": c["share_of_misfit"],
+            "what it means": _meaning(c["id"], c["form"]),
         }
         for c in causes
-        for number, (name, values) in enumerate((c["parameters"] or {"": NO_SIZE}).items())
     ]
-    formats = dict.fromkeys(["mean", "5 %", "95 %"], "{:.3g}")
-    formats |= dict.fromkeys(["probability", "share of misfit"], "{}")
+    sizes = [
+        (
+            "" if number else effect(c["id"]).title,
+            name,
+            *with_band(values["mean"], values["q05"], values["q95"]),
+            parameters[name].printed_unit,
+            parameters[name].meaning,
+        )
+        for c in causes
+        for number, (name, values) in enumerate(c["parameters"].items())
+    ]
     bent = any(is_bend(name) for c in causes for name in c["parameters"])
     text = f"{FORMS} {BENT}" if bent else FORMS
     undecided = [
@@ -259,7 +261,12 @@ def _causes(causes: list[dict[str, Any]], parameters: dict[str, Parameter]) -> l
         text += (
             f" The data leave other equations open for: {', '.join(undecided)}. The bands allow for these."
         )
-    return [Text(text), DataTable(pd.DataFrame(rows), "Causes with their sizes (90 % bands)", formats)]
+    told = {"probability": "{}", "share of misfit": "{:.3g}"}
+    blocks: list[Block] = [Text(text), DataTable(pd.DataFrame(named), "What they are", told)]
+    if sizes:
+        frame = pd.DataFrame(sizes, columns=["cause", "parameter", "size", "90 % band", "unit", "meaning"])
+        blocks.append(DataTable(frame, "Their sizes", {"size": "{}", "90 % band": "{}"}))
+    return blocks
 
 
 def _meaning(identifier: str, form: str) -> str:
@@ -274,7 +281,10 @@ def _meaning(identifier: str, form: str) -> str:
 
 def _alternatives(content: dict[str, Any], found: Diagnosis) -> list[Block]:
     near, shown = found.verdict.near(), found.verdict.likeliest()
-    text = f"Sets within {BESIDE:g} nats of the likeliest, hardly told from it here: {near or 'none'}."
+    text = (
+        f"Sets that the data hardly tell from the likeliest (within {BESIDE:g} nats, a factor of "
+        f"{significant(float(np.exp(BESIDE)), 2)} in probability): {near or 'none'}."
+    )
     if more := len(content["alternatives"][shown:]):
         text += (
             f" Sets with one cause more, less likely beforehand, that the data do not exclude either: {more} "
@@ -316,15 +326,15 @@ def _limits(content: dict[str, Any], parameters: dict[str, Parameter]) -> list[B
         {
             "effect": effect(limit["id"]).title,
             "parameter": name,
-            "5 %": band["q05"],
-            "95 %": band["q95"],
+            "5 %": significant(band["q05"], 2),
+            "95 %": significant(band["q95"], 2),
             "unit": parameters[name].printed_unit,
             "what would show it": effect(limit["id"]).told_by,
         }
         for limit in content["limits"]
         for name, band in limit["parameters"].items()
     ]
-    formats = dict.fromkeys(["5 %", "95 %"], "{:.2g}")
+    formats = dict.fromkeys(["5 %", "95 %"], "{}")
     return [Text(text), DataTable(pd.DataFrame(rows), "Sizes that these data leave room for", formats)]
 
 
@@ -357,7 +367,8 @@ def _gain(content: dict[str, Any]) -> list[Block]:
         f"Whole {gain['held_out']} groups were held out, {gain['folds']} folds, with search and fit "
         f"repeated in each (after); "
         f"{gain['folds_same_set']} of them chose the same causes. The held-out readings are "
-        f"{gain['elpd_gain']:.4g} ± {gain['elpd_gain_se']:.3g} nats more probable with the extended model. "
+        f"{gain['elpd_gain']:.4g} ± {gain['elpd_gain_se']:.3g} nats more probable with the extended model "
+        "(each nat is a factor of 2.7). "
         "With fewer data a fold may recognise other causes: the last column keeps those named above, "
         f"fitted anew in every fold ({gain['elpd_gain_named']:.4g} ± {gain['elpd_gain_named_se']:.3g} nats)."
     )

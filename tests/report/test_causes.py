@@ -64,13 +64,21 @@ def test_a_cause_states_its_probability_once_and_warns_of_bends(form: str) -> No
     sizes = {name: {"mean": 0.1, "sd": 0.01, "q05": 0.08, "q95": 0.12} for name in parameters}
     cause = {"id": "creep", "form": form, "probability": 0.98, "share_of_misfit": 0.7, "parameters": sizes}
     cause["forms"] = [{"form": form, "probability": 1.0}]
-    text, table = _causes([cause], parameters)
+    text, told, sized = _causes([cause], parameters)
     assert isinstance(text, Text)
-    assert isinstance(table, DataTable)
+    assert isinstance(told, DataTable)
+    assert isinstance(sized, DataTable)
     assert (BENT in text.html) == (form == "bent")
-    assert len(table.rows) == len(parameters) > (form == "bent")
-    once = [(row[2], row[-1]) for row in table.rows]
-    assert once == [("0.98", "0.7"), *[("", "")] * (len(parameters) - 1)]
+    assert [row[:3] for row in told.rows] == [["Creep", "0.98", "0.7"]]
+    assert len(sized.rows) == len(parameters) > (form == "bent")
+    assert [row[1:4] for row in sized.rows] == [[name, "0.100", "0.080–0.120"] for name in parameters]
+
+
+def test_a_cause_without_a_size_is_told_all_the_same() -> None:
+    cause = {"id": "braid_kinematics", "form": "", "probability": 0.98, "share_of_misfit": 0.7}
+    _, told = _causes([cause | {"parameters": {}, "forms": [{"form": "", "probability": 1.0}]}], {})
+    assert isinstance(told, DataTable)
+    assert len(told.rows) == 1
 
 
 @pytest.mark.parametrize(("probability", "open_"), [(0.97, False), (0.6, True)])

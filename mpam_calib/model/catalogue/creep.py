@@ -131,7 +131,7 @@ register(
         id="creep",
         stage=Stage.HISTORY,
         title="Creep",
-        sentence="the force relaxes with the logarithm of the time spent at a pressure",
+        sentence="the force relaxes with the time spent at a pressure",
         told_by="a hold of ten minutes at one pressure and length",
         source="logarithmic relaxation: F(1 − creep·log10(1 + t/1 s))",
         parameters=_parameters,

@@ -111,7 +111,7 @@ register(
         id="rate_friction",
         stage=Stage.FRICTION,
         title="Rate-dependent friction",
-        sentence="the loop is wider when the crosshead moves faster",
+        sentence="friction depends on speed: the loop is wider, or narrower, when the crosshead moves faster",
         told_by="the same loop at a third speed, ten times slower or faster",
         source="logarithmic in speed, relative to the geometric mean of the test's speeds",
         parameters=_parameters,
