@@ -8,6 +8,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import combinations, product
 
 import numpy as np
 from scipy import linalg
@@ -83,6 +84,22 @@ def in_another_form(task: tuple[Fit, str]) -> Fit | None:
     # By a fit's first doubt, none, its equations are taken at their word.
     plain = found.under[0].log_evidence - sum(map(price, sorted(found.effects)))
     return None if at_word is None or at_word.log_evidence < plain - HOPELESS else with_doubt(at_word)
+
+
+def in_two_other_equations(found: Fit) -> Fit:
+    """A doubted fit with the pair of its effects in other equations that suits it best, if it is better so.
+
+    A bend of one may hold what the other's equation lacks, and then no change of one alone leads on.
+    """
+    own = named_forms(found)
+    best: Fit | None = None
+    for pair in combinations(sorted(own), 2):
+        for forms in product(*(equations_of(e) for e in pair)):
+            if all(form != own[e] for e, form in zip(pair, forms, strict=True)):
+                choice = own | dict(zip(pair, forms, strict=True))
+                best = _better(best, tuple(choice.values()), found.size, ended(found))
+    rivals = [] if best is None else [with_doubt(best)]
+    return max([found, *rivals], key=lambda f: f.log_evidence)
 
 
 def _best_with(found: Fit, forms: list[str]) -> Fit | None:

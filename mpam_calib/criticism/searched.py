@@ -23,6 +23,7 @@ from mpam_calib.criticism.refits import (
     causes_of,
     ended,
     in_another_form,
+    in_two_other_equations,
     named_forms,
     other_forms,
     with_better_forms,
@@ -48,6 +49,8 @@ LEADERS = 5
 """Sets whose parts and forms are looked at once more."""
 DOUBTED_EACH = 4
 """Best sets of every number of effects that are doubted in the end."""
+IN_PAIRS = 2 * WIDTH
+"""Leading sets (within ``NEAR``) of which two forms at a time are changed in the end."""
 IN_ALL_FORMS, CLOSE = 6, 12.0
 """So many leading sets, and nats behind the best, of which all forms have their say in the end."""
 TURNS = 2
@@ -251,8 +254,12 @@ class Search:
     def over_forms(self) -> None:
         """Give the sets that may lead the evidence of all their forms.
 
-        The likeliest alone says too little for a cause that many equations describe.
+        The likeliest alone says too little for a cause that many equations describe, and forms that were
+        found one after the other need not be the likeliest.
         """
+        near = [s for s in self.sets if self.score(s) > self.score(self.sets[0]) - NEAR][:IN_PAIRS]
+        found = self.spread(in_two_other_equations, [self.best_fit(s) for s in near])
+        self.fits |= {(s, fit.size): fit for s, fit in zip(near, found, strict=True)}
         least = self.score(self.sets[0]) - CLOSE
         self.refit_in_forms([s for s in self.sets if self.score(s) > least][:IN_ALL_FORMS])
 
