@@ -1,4 +1,7 @@
-"""Two causes that act at the same moment: the forms of both are to be found, not of one after the other."""
+"""Two causes whose forms are to be found together, not one after the other.
+
+They act at the same moment, or a bend of one holds what the other's form lacks.
+"""
 
 from __future__ import annotations
 
@@ -12,22 +15,47 @@ from criticism.test_sizes import force_with
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.forms import forms_of, price
 from mpam_calib.criticism.problem import Problem
-from mpam_calib.criticism.refits import ended, with_better_forms
+from mpam_calib.criticism.refits import (
+    ended,
+    in_another_form,
+    in_two_other_equations,
+    other_forms,
+    with_better_forms,
+    with_doubt,
+)
 from mpam_calib.criticism.spread import held_problem, spread_over
 
 TRUE = frozenset({"creep:early", "presliding"})
 """A level that was held before its first stroke, which a turn began: both act on its first readings."""
 SIZES = {"creep_per_decade": 0.7, "creep_before_s": 1.0, "reversal_mm": 0.5}
+CURVED = frozenset({"pressure_droop:saturating", "tip_shape:power"})
+"""A droop and ends that both bend along the stroke."""
+CURVED_SIZES = {"droop_percent": 1.0, "droop_steepness": -0.4, "tip_factor": 0.5, "tip_exponent": 1.5}
 
 
-@pytest.fixture(scope="module")
-def problem() -> Problem:
+def hiding(causes: frozenset[str], sizes: dict[str, float]) -> Problem:
     """Both causes hidden in a case that hides nothing else."""
     recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
     bare = problem_of(specimen_of(recipe.name))
     start = fit(bare, frozenset(), 0)
-    change = force_with(bare, start, "+".join(TRUE), SIZES) - start.force
+    change = force_with(bare, start, "+".join(causes), sizes) - start.force
     return bare.with_force(bare.force + change)
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return hiding(TRUE, SIZES)
+
+
+@pytest.fixture(scope="module")
+def curved() -> Problem:
+    return hiding(CURVED, CURVED_SIZES)
+
+
+def doubted(problem: Problem, causes: frozenset[str]) -> Fit:
+    """A fit as the leading sets have it in the end."""
+    with spread_over(problem, 1):
+        return with_doubt(priced(fit(problem, causes, 0)))
 
 
 def priced(found: Fit) -> Fit:
@@ -59,3 +87,19 @@ def test_a_pair_in_its_best_forms_stays_there(problem: Problem) -> None:
     true = priced(fit(problem, TRUE, 0))
     with spread_over(problem, 1):
         assert with_better_forms(true).effects == TRUE
+
+
+def test_two_equations_come_out_of_a_bend_that_no_change_of_one_leads_out_of(curved: Problem) -> None:
+    trapped, true = doubted(curved, frozenset({"pressure_droop", "tip_shape:bent"})), doubted(curved, CURVED)
+    with spread_over(curved, 1):
+        alone = [in_another_form((trapped, form)) for form in other_forms(trapped)]
+        found = in_two_other_equations(trapped)
+    assert max(f.log_evidence for f in alone if f is not None) < true.log_evidence - 10.0
+    assert found.effects == CURVED
+    assert found.log_evidence == pytest.approx(true.log_evidence, abs=0.05)
+
+
+def test_no_other_two_are_taken_for_the_best(curved: Problem) -> None:
+    true = doubted(curved, CURVED)
+    with spread_over(curved, 1):
+        assert in_two_other_equations(true) is true
