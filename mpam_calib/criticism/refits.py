@@ -36,6 +36,11 @@ def named_forms(found: Fit) -> dict[str, str]:
     return {e.partition(":")[0]: e for e in sorted(found.effects)}
 
 
+def bends(found: Fit) -> bool:
+    """Whether an effect of a fit follows no equation, but a bent one."""
+    return any(form not in equations_of(e) for e, form in named_forms(found).items())
+
+
 def ended(found: Fit) -> dict[str, float]:
     """Where a fit ended."""
     return dict(zip(found.names, found.u.tolist(), strict=True))

@@ -19,6 +19,7 @@ from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
 from mpam_calib.criticism.refits import (
     Set,
     Try,
+    bends,
     best_of,
     causes_of,
     ended,
@@ -49,8 +50,8 @@ LEADERS = 5
 """Sets whose parts and forms are looked at once more."""
 DOUBTED_EACH = 4
 """Best sets of every number of effects that are doubted in the end."""
-IN_PAIRS = 2 * WIDTH
-"""Leading sets (within ``NEAR``) of which two forms at a time are changed in the end."""
+IN_PAIRS = 6
+"""Leading sets with bent forms (within ``NEAR``) of which two forms at a time are changed in the end."""
 IN_ALL_FORMS, CLOSE = 6, 12.0
 """So many leading sets, and nats behind the best, of which all forms have their say in the end."""
 TURNS = 2
@@ -257,7 +258,8 @@ class Search:
         The likeliest alone says too little for a cause that many equations describe, and forms that were
         found one after the other need not be the likeliest.
         """
-        near = [s for s in self.sets if self.score(s) > self.score(self.sets[0]) - NEAR][:IN_PAIRS]
+        least = self.score(self.sets[0]) - NEAR
+        near = [s for s in self.sets if self.score(s) > least and bends(self.best_fit(s))][:IN_PAIRS]
         found = self.spread(in_two_other_equations, [self.best_fit(s) for s in near])
         self.fits |= {(s, fit.size): fit for s, fit in zip(near, found, strict=True)}
         least = self.score(self.sets[0]) - CLOSE
