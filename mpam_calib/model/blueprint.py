@@ -14,6 +14,8 @@ from pydantic import BaseModel, ConfigDict
 from mpam_calib.model.reference import force_scale, geometric_contraction
 from mpam_calib.model.state import Setting
 from mpam_calib.specimen.declaration import Braid, Geometry, Noise, Sensors, Simulation
+from mpam_calib.specimen.levels import same_level
+from mpam_calib.specimen.motion import run_ids
 from mpam_calib.specimen.recording import Loops, Specimen
 from mpam_calib.units import MINUTE, MM
 
@@ -28,7 +30,7 @@ ENOUGH = 8
 RAMPS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
 """Shares of a stroke's time in which it may do so."""
 PULL_SHARE = 0.02
-"""A muscle that shows this share of its greatest force pulls."""
+"""A muscle that shows this share of its greatest force pulls; a gauge that shows less of the top is at 0."""
 
 
 class Value(BaseModel):
@@ -84,6 +86,7 @@ class Blueprint(Value):
     branches: bool
     free_contraction: bool
     tensile_range: tuple[float, float] | None
+    tensile_tested: tuple[float, float] | None = None
     material: MaterialPosterior | None = None
     options: Options = Options()
 
@@ -133,13 +136,14 @@ def draw_blueprint(
         reach=tuple(float(r) for r in reach),
         pulls_at=_pulls_at(specimen),
         stroke_time=None if loops is None else _stroke_time(loops),
-        reading_time=0.0 if loops is None else max(float(np.median(np.diff(loops.time_s))), 1e-6),
+        reading_time=0.0 if loops is None else _reading_time(loops),
         duration=0.0 if loops is None else float(loops.time_s.max()),
         level_time=0.0 if loops is None else _level_time(loops),
         speed=50.0 * MM / MINUTE if loops is None else _speed(loops),
         branches=any(p is not None and bool(np.any(np.abs(p.branch) == 1)) for p in parts),
         free_contraction=specimen.free_contraction is not None,
         tensile_range=_tensile_range(specimen),
+        tensile_tested=None if specimen.tensile is None else specimen.tensile.strain_range,
         material=material,
         options=options or Options(),
     )
@@ -158,31 +162,37 @@ def _reach(specimen: Specimen) -> Array:
         np.maximum.at(reach, grid.level[seen], grid.contraction[seen])
     if (free := specimen.free_contraction) is not None and len(levels):
         nearest = np.abs(free.pressure_Pa[:, None] - levels).argmin(axis=1)
-        np.maximum.at(reach, nearest, free.contraction)
+        # Levels that loops or maps gave know nothing of what was seen far from them.
+        own = loops is None and grid is None
+        here = own | same_level(free.pressure_Pa, levels[nearest])
+        np.maximum.at(reach, nearest[here], free.contraction[here])
     return reach
 
 
 def _pulls_at(specimen: Specimen) -> float:
     """The lowest pressure (Pa) with a clear pull; the top level where nothing pulls."""
     top = float(specimen.levels_Pa[-1]) if len(specimen.levels_Pa) else 0.0
-    parts = [p for p in (specimen.loops, specimen.force_map, specimen.blocked_force) if p is not None]
+    loops, grid, blocked = specimen.loops, specimen.force_map, specimen.blocked_force
+    parts = [p for p in (loops, grid, blocked) if p is not None]
     if not parts:
         return top
     force = np.concatenate([part.force_N for part in parts])
     pressure = np.concatenate([part.pressure_Pa for part in parts])
+    # A bladder that is longer than at rest pulls by itself: what it pulls says nothing of the pressure.
+    way = [] if loops is None else [loops.displacement_m]
+    way += [] if grid is None else [grid.contraction]
+    way += [] if blocked is None else [np.zeros(len(blocked.force_N))]
     clear = force > max(PULL_SHARE * float(force.max()), 5.0 * (specimen.sensors.force_sd_N or 0.0))
+    clear &= (np.concatenate(way) >= 0.0) & (pressure > PULL_SHARE * top)
     # One stray reading must not decide: the first percentile of the pulling pressures.
     return float(np.quantile(pressure[clear], 0.01)) if clear.any() else top
 
 
 def _tensile_range(specimen: Specimen) -> tuple[float, float] | None:
-    """The declared range of strain, else all positive strains of the test."""
+    """The declared range of strain, else that of the test."""
     if specimen.tensile is None:
         return None
-    if specimen.fit.tensile_strain is not None:
-        return specimen.fit.tensile_strain
-    strain = specimen.tensile.strain
-    return max(float(strain.min()), 0.0), float(strain.max())
+    return specimen.fit.tensile_strain or specimen.tensile.strain_range
 
 
 def _stroke_time(loops: Loops) -> float:
@@ -232,6 +242,11 @@ def _passed(share: Array, ramp: float) -> Array:
     return np.where(share < 0.5, passed, 1.0 - passed)
 
 
+def _reading_time(loops: Loops) -> float:
+    return max(float(np.median(np.diff(loops.time_s))), 1e-6) if len(loops.time_s) > 1 else 1.0
+
+
 def _level_time(loops: Loops) -> float:
-    spans = pd.Series(loops.time_s).groupby(loops.level)
+    """The longest that one level was held, s; a level that comes back later is held anew."""
+    spans = pd.Series(loops.time_s).groupby(run_ids(loops.clock, loops.level))
     return float((spans.max() - spans.min()).max())

@@ -94,9 +94,8 @@ class Chain:
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
         """The declared effects in the order of the chain, whatever order they were declared in."""
-        return tuple(
-            sorted((effect_by_id(i) for i in self.setting.simulation.effects), key=lambda e: (e.stage, e.id))
-        )
+        declared = (effect_by_id(i) for i in self.setting.simulation.effects)
+        return tuple(sorted(declared, key=lambda e: (e.stage, e.comes_last, e.id)))
 
     @cached_property
     def friction(self) -> DeclaredFriction:
@@ -191,8 +190,9 @@ class Chain:
         state = self._stage(Stage.RIG, state, values)
         state = state._replace(length=state.rest.L0 - state.displacement)
         state = self._stage(Stage.SHAPE, state, values)
-        length = np.maximum(state.length, SHORTEST * state.rest.L0)
-        shape = swollen(SHAPES[state.kinematics](length, state.rest), state.rest, state.swell)
+        # Tips may take the whole length: what rubs and stretches is never shorter than the shape.
+        state = state._replace(length=np.maximum(state.length, SHORTEST * state.rest.L0))
+        shape = swollen(SHAPES[state.kinematics](state.length, state.rest), state.rest, state.swell)
         state = self._stage(Stage.STATICS, state._replace(shape=shape), values)
         state = self.friction.apply(state, values)
         for stage in (Stage.FRICTION, Stage.HISTORY, Stage.SENSOR):

@@ -47,9 +47,10 @@ class Effect:
     the priors for a setting; ``apply`` returns the changed state. ``forms`` are other shapes of
     the same thing with the same parameters, declared as ``id:form``. ``uses_force`` is set where it
     needs the muscle's own force (a fixture that gives way), which the chain then finds by fixed
-    point. ``needs_braid`` is set where it needs the declared strands. Without ``memory`` it looks at
-    pressure, place, direction, level and force alone, not at what was before. ``bends`` names the drivers
-    (and degrees) along which its parameters may vary, all alike, in the form ``id:bent``
+    point. ``needs_braid`` is set where it needs the declared strands, ``comes_last`` where it acts on what
+    the others of its stage add up to. Without ``memory`` it looks at pressure, place,
+    direction, level and force alone, not at what was before. ``bends`` names the drivers (and degrees) along
+    which its parameters may vary, all alike, in the form ``id:bent``
     (:mod:`mpam_calib.model.bend`), ``looseness`` how many times as far as usual, and ``kinds`` those of its
     forms that differ from it in kind and may bend too (``id:form-bent``), with a few words for each. Bends
     multiply a size; where it may come back to nothing and pass it, they are ``added`` in units of its prior
@@ -74,6 +75,7 @@ class Effect:
     told_by: str = ""
     uses_force: bool = False
     needs_braid: bool = False
+    comes_last: bool = False
     memory: bool = True
     bends: Mapping[str, int] = field(default_factory=dict)
     looseness: float = 1.0

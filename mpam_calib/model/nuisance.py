@@ -16,6 +16,10 @@ MEANINGS = {
     "t0_mm": "wall thickness at rest",
     "alpha0_deg": "braid angle at rest",
 }
+HIGHEST = {"alpha0_deg": 0.5 * np.pi}
+"""SI; all geometry lies above 0."""
+FAR = 8.0
+"""Standard deviations from which on a bound does not count."""
 BIAS = "pressure_bias_kPa"
 
 
@@ -26,13 +30,20 @@ def nuisance_parameters(setting: Setting) -> tuple[Parameter, ...]:
         sd = getattr(setting.geometry.sd, name) * si_factor(name)
         matching = name == "alpha0_deg" and "braid_angle" in setting.simulation.effect_ids
         if sd > 0.0 and not matching:
-            prior = Normal(getattr(setting.geometry, attribute), sd)
+            prior = _possible(getattr(setting.geometry, attribute), sd, HIGHEST.get(name, np.inf))
             parameters.append(Parameter(name, prior, MEANINGS[name], "specimen.toml"))
     if setting.pressure_bias_sd > 0.0 and "dead_band" not in setting.simulation.effect_ids:
         # A level at which the muscle was seen to pull had some pressure.
         bias = NormalWithin(0.0, setting.pressure_bias_sd, -setting.pulls_at, np.inf)
         parameters.append(Parameter(BIAS, bias, "true pressure minus the gauge's reading", "specimen.toml"))
     return tuple(parameters)
+
+
+def _possible(value: float, sd: float, highest: float) -> Normal | NormalWithin:
+    """What was measured, given that the geometry exists."""
+    if min(value, highest - value) > FAR * sd:
+        return Normal(value, sd)
+    return NormalWithin(value, sd, 0.0, highest)
 
 
 def apply_nuisances(state: State, values: Values) -> State:

@@ -10,12 +10,16 @@ from emcee import EnsembleSampler, State
 from emcee.moves import DEMove, DESnookerMove, StretchMove
 from numpy.typing import NDArray
 
+from mpam_calib.errors import InputError
 from mpam_calib.posterior.collapsed import Collapsed
 from mpam_calib.posterior.mode import evaluate
 from mpam_calib.posterior.pool import held_target
 from mpam_calib.posterior.proposal import StudentMixture, independence_move
 
 Array = NDArray[np.float64]
+
+ROUNDS = 100
+"""Draws again for starts outside the posterior's support."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +79,20 @@ def evaluate_held(u: Array) -> Array:
 def start_states(
     target: Collapsed, mixture: StudentMixture, walkers: int, seeds: list[int]
 ) -> list[EnsembleState]:
-    """Over-dispersed starts: three times as wide as the fitted mixture, inside the posterior's support."""
+    """Over-dispersed starts: three times as wide as the fitted mixture, inside the posterior's support.
+
+    Raises ``InputError`` where ROUNDS of draws find none there.
+    """
     states = []
     for seed in seeds:
         rng = np.random.RandomState(seed)
         coords = mixture.draw(walkers, rng, widen=3.0)
         log_prob = evaluate(target, coords)
+        rounds = 0
         while np.any(bad := ~np.isfinite(log_prob)):
+            if (rounds := rounds + 1) > ROUNDS:
+                found = "no finite probability near the best fit"
+                raise InputError("the data", found, "readings, none of them a code for a missing one")
             coords[bad] = mixture.draw(int(bad.sum()), rng, widen=1.0)
             log_prob[bad] = evaluate(target, coords[bad])
         states.append(EnsembleState(coords, log_prob, rng.get_state()))

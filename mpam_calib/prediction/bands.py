@@ -96,7 +96,10 @@ def stress_bands(model: Model, draws: Draws, seed: int) -> pd.DataFrame:
         _table(name, np.zeros(1), strain, "", values[:, None, :])
         for name, values in (("stress_Pa", stress), ("stress_Pa_observed", noisy))
     ]
-    return pd.concat(parts, ignore_index=True).assign(extrapolated=False)[COLUMNS]
+    table = pd.concat(parts, ignore_index=True)
+    low, high = model.blueprint.tensile_tested or (-np.inf, np.inf)
+    beyond = (table["contraction"] < low - 1e-9) | (table["contraction"] > high + 1e-9)
+    return table.assign(extrapolated=beyond)[COLUMNS]
 
 
 def stress_draws(model: Model, draws: Draws, strain: Array, remainder: bool = True) -> Array:

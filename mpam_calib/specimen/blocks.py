@@ -172,8 +172,8 @@ def _frame(raw: bytes, form: TextFormat, *, text: bool) -> pd.DataFrame:
         encoding_errors="replace",
         engine="c",
     )
-    frame.columns = pd.Index([field.name for field in fields])
-    return frame
+    # One column of the rig may be mapped to several of the package's.
+    return pd.DataFrame({field.name: frame[str(field.position)] for field in fields})
 
 
 def _check_count(label: str, lines: _Lines, frame: pd.DataFrame) -> None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from mpam_calib.specimen.motion import run_ids, run_starts
-from mpam_calib.specimen.recording import Floats, Ints
+from mpam_calib.specimen.recording import Bools, Floats, Ints
 from mpam_calib.units import KPA
 
 SAME_LEVEL_PA = 1.0 * KPA
 """Levels of two kinds of file are one if they differ by less than this ..."""
 SAME_LEVEL_SHARE = 0.02
 """... or by less than this share of the level."""
+STEADY = 10
+"""Rows that a commanded setpoint stays on average, at least."""
 LEAST_RUN = 5
 """Fewer rows than this far from their stroke's level are noise, not a change of level."""
 SMALLEST_GAP_PA = 0.3 * KPA
@@ -94,6 +96,31 @@ def _moved(pressure: Floats, own: Ints, centres: Floats) -> Ints:
     return np.where(long, near, own)
 
 
+def setpoint_levels(setpoint: Floats) -> Ints:
+    """Levels (rows,) by setpoints (Pa), from 0 upwards: each value, or what is close to it if read back.
+
+    A setpoint that is commanded stays for many rows; one that is read back has noise.
+    """
+    exact = np.unique(np.round(setpoint, 3), return_inverse=True)[1].astype(np.int64)
+    if len(setpoint) >= STEADY * len(run_starts(run_ids(exact))):
+        return exact
+    return gap_clusters(setpoint, STATIC_GAPS)
+
+
+def same_level(pressure: Floats, level: Floats) -> Bools:
+    """Whether pressures (Pa) are at levels (Pa), element by element."""
+    tolerance = np.maximum(SAME_LEVEL_PA, SAME_LEVEL_SHARE * np.abs(level))
+    return np.asarray(np.abs(pressure - level) <= tolerance)
+
+
+def sorted_levels(pressure: Floats, level: Ints) -> tuple[Ints, Floats]:
+    """Levels numbered by rising median pressure, and these medians (Pa); those that read alike are one."""
+    found = np.unique(level, return_inverse=True)[1].astype(np.int64)
+    place = np.unique(np.round(medians_by_label(pressure, found), 3), return_inverse=True)[1]
+    level = place[found].astype(np.int64)
+    return level, medians_by_label(pressure, level)
+
+
 def merge_levels(loops_Pa: Floats, map_Pa: Floats) -> tuple[Floats, Ints, Ints]:
     """One sorted list of levels from those of loops and of a force map (Pa, each sorted).
 
@@ -105,8 +132,7 @@ def merge_levels(loops_Pa: Floats, map_Pa: Floats) -> tuple[Floats, Ints, Ints]:
         index = np.arange(len(levels), dtype=np.int64)
         return levels, index[: len(loops_Pa)], index[: len(map_Pa)]
     nearest = _nearest(map_Pa, loops_Pa)
-    tolerance = np.maximum(SAME_LEVEL_PA, SAME_LEVEL_SHARE * np.abs(loops_Pa[nearest]))
-    same = np.abs(map_Pa - loops_Pa[nearest]) <= tolerance
+    same = same_level(map_Pa, loops_Pa[nearest])
     levels = np.sort(np.concatenate([loops_Pa, map_Pa[~same]]))
     chosen = np.where(same, loops_Pa[nearest], map_Pa)
     return levels, np.searchsorted(levels, loops_Pa), np.searchsorted(levels, chosen)

@@ -11,7 +11,7 @@ import pandas as pd
 
 from mpam_calib.specimen.clock import Clock
 from mpam_calib.specimen.declaration import Geometry
-from mpam_calib.specimen.levels import medians_by_label, setpoint_notes, stroke_levels
+from mpam_calib.specimen.levels import setpoint_levels, setpoint_notes, sorted_levels, stroke_levels
 from mpam_calib.specimen.motion import (
     Motion,
     cycles_at_turns,
@@ -25,6 +25,7 @@ from mpam_calib.specimen.motion import (
 from mpam_calib.specimen.plausibility import (
     check_branch,
     check_changes,
+    check_codes,
     check_displacement,
     check_force,
     check_pressure,
@@ -89,7 +90,10 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
         )
     rows = pd.concat([frame[sorted(everywhere)] for frame in frames], ignore_index=True)
     pressure = rows["pressure_kPa"].to_numpy() * KPA
-    level, levels_Pa = _sorted_levels(pressure, level)
+    apart = len(np.unique(level))
+    level, levels_Pa = sorted_levels(pressure, level)
+    if len(levels_Pa) < apart:
+        notes.append(f"loops: {apart} setpoints are {len(levels_Pa)} levels, for some read the same pressure")
     _check_levels(files, frames, clock, level, levels_Pa)
     if "setpoint_kPa" in everywhere:
         notes += setpoint_notes(rows["setpoint_kPa"].to_numpy() * KPA, level, levels_Pa)
@@ -167,6 +171,7 @@ def censored_rows(frame: pd.DataFrame, floor_N: float | None) -> Bools:
 def _check_plausible(file: DataFile, frame: pd.DataFrame, geometry: Geometry) -> None:
     held = "branch" in frame and bool(frame["branch"].isin([PRESSURISING, DEPRESSURISING]).any())
     rows = frame.index.to_numpy()
+    check_codes(file.label, frame)
     check_displacement(file.label, frame["displacement_mm"].to_numpy() * MM, rows, geometry, held=held)
     check_force(file.label, "loops", frame["force_N"].to_numpy(), frame["displacement_mm"].to_numpy())
     check_changes(file.label, frame["force_N"].to_numpy())
@@ -183,8 +188,7 @@ def _levels_and_motion(frames: Sequence[pd.DataFrame], clock: Ints, setpoints: b
     """
     rough = _joined([_motion(frame, np.zeros(len(frame), dtype=np.int64)) for frame in frames]).branch
     if setpoints:
-        values = np.concatenate([frame["setpoint_kPa"].to_numpy() for frame in frames])
-        level = np.unique(np.round(values, 6), return_inverse=True)[1].astype(np.int64)
+        level = setpoint_levels(np.concatenate([frame["setpoint_kPa"].to_numpy() for frame in frames]) * KPA)
     else:
         pressure = np.concatenate([frame["pressure_kPa"].to_numpy() for frame in frames]) * KPA
         steady = ~np.isin(rough, [PRESSURISING, DEPRESSURISING])
@@ -209,14 +213,6 @@ def _motion(frame: pd.DataFrame, runs: Ints) -> Motion:
     threshold, sd = turn_threshold(displacement), noise_sd(displacement)
     pieces = np.split(displacement, run_starts(runs)[1:])
     return _joined([read_motion(piece, threshold, sd) for piece in pieces])
-
-
-def _sorted_levels(pressure: Floats, level: Ints) -> tuple[Ints, Floats]:
-    """Levels numbered by rising median pressure, and these medians (Pa)."""
-    level = np.unique(level, return_inverse=True)[1].astype(np.int64)
-    medians = medians_by_label(pressure, level)
-    order = np.argsort(medians, kind="stable")
-    return np.argsort(order, kind="stable").astype(np.int64)[level], medians[order]
 
 
 def _check_levels(

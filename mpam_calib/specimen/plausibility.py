@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pandas as pd
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import FileKind, Geometry
@@ -18,6 +19,8 @@ LEAST_STROKE = 0.005
 """Smaller largest displacements, as a share of L0, are taken for metres, or lengthening for shortening."""
 LONG_SHARE = 0.1
 """Share of the rows that are taken as those where the muscle is long."""
+MOST = {"force_N": 1e6, "pressure_kPa": 1e9, "displacement_mm": 1e5, "contraction": 1e2, "stress_Pa": 1e10}
+"""Sizes of readings, in the files' units, that no rig for such muscles reads."""
 AGAINST = 0.8
 """Share of all motion against its branch's direction from which the words are taken for swapped."""
 
@@ -76,8 +79,27 @@ def check_branch(label: str, branch: Ints, displacement_m: Floats, rows: Ints) -
         raise InputError(label, found, expected, int(rows[first]), "branch")
 
 
+def check_codes(label: str, frame: pd.DataFrame) -> None:
+    """Refuse values that no rig reads: what an instrument writes for none (overload 9.9e37, -99999)."""
+    for name, most in MOST.items():
+        if name in frame:
+            values = frame[name].to_numpy()
+            far = np.flatnonzero(np.abs(values) > most)
+            if len(far):
+                found = f"{values[far[0]]:g} (a code for no reading?)"
+                raise InputError(label, found, f"at most {most:g}", int(frame.index[far[0]]), name)
+
+
 def check_strain(label: str, strain: Floats, rows: Ints) -> None:
-    """Refuse strains that no rubber survives."""
+    """Refuse strains that no rubber survives, one strain throughout, and compression."""
+    median = float(np.median(strain))
+    if median < 0.0:
+        expected = f"extension above 0; {map_hint('tensile', 'strain', '-1.0')}"
+        raise InputError(label, f"a median strain of {median:.3g} (flipped sign?)", expected, None, "strain")
+    if strain.max() <= max(float(strain.min()), 0.0):
+        raise InputError(
+            label, f"a strain of {strain.max():g} throughout", "a range of strains", None, "strain"
+        )
     high = np.flatnonzero(strain > HIGHEST_STRAIN)
     if len(high):
         found = f"{strain[high[0]]:g} (per cent?)"

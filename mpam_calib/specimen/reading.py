@@ -62,7 +62,8 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
             free, rows["free_contraction"] = read_free_contraction(of("free_contraction"), geometry)
     if of("tensile"):
         tensile, rows["tensile"] = read_tensile(of("tensile"))
-        in_range = _rows_in_range(tensile.strain, declaration.fit.tensile_strain)
+        low, high = declaration.fit.tensile_strain or tensile.strain_range
+        in_range = int(np.count_nonzero((tensile.strain >= low) & (tensile.strain <= high)))
         check_rows(of("tensile")[0].label, in_range, simulation.order + 1)
 
     levels_Pa, loops, force_map = _common_levels(loops, force_map, blocked, free)
@@ -138,11 +139,6 @@ def _check_pulls(label: str, levels_Pa: Floats, censored: list[Bools]) -> None:
     if censored and all(flags.all() for flags in censored):
         found = "every row slack (at or below the floor, or censored)"
         raise InputError(label, found, "readings above the floor", None, "force_N")
-
-
-def _rows_in_range(strain: Floats, limits: tuple[float, float] | None) -> int:
-    low, high = limits if limits is not None else (-np.inf, np.inf)
-    return int(np.count_nonzero((strain >= low) & (strain <= high)))
 
 
 def _digest(source: TomlSource, declaration: Declaration, files: list[DataFile]) -> str:

@@ -114,6 +114,11 @@ class Tensile:
     strain: Floats
     stress_Pa: Floats
 
+    @property
+    def strain_range(self) -> tuple[float, float]:
+        """All its positive strains: from, to."""
+        return max(float(self.strain.min()), 0.0), float(self.strain.max())
+
 
 @dataclass(frozen=True)
 class FileRead:

@@ -70,6 +70,8 @@ def data_files(source: TomlSource, declaration: Declaration) -> list[DataFile]:
     for kind in get_args(FileKind):
         for name in declaration.files.of(kind):
             keys = ["files", kind]
+            if "\0" in name:
+                raise fault(source, keys, f"{quoted(name)}", "a file's name")
             path = folder / name
             if not path.resolve().is_relative_to(folder.resolve()):
                 outside = f"a file outside the specimen's folder ({quoted(name)})"

@@ -13,6 +13,7 @@ from mpam_calib.specimen.declaration import Geometry
 from mpam_calib.specimen.levels import medians_by_label, static_levels
 from mpam_calib.specimen.loops import censored_rows
 from mpam_calib.specimen.plausibility import (
+    check_codes,
     check_contraction,
     check_force,
     check_pressure,
@@ -83,6 +84,7 @@ def read_tensile(files: Sequence[DataFile]) -> tuple[Tensile, tuple[int, ...]]:
             expected = f"tension above 0; {map_hint('tensile', 'stress_Pa', '-1.0')}"
             found = f"a median stress of {stress:.3g} Pa (flipped sign?)"
             raise InputError(file.label, found, expected, None, "stress_Pa")
+        check_codes(file.label, frame)
         check_strain(file.label, frame["strain"].to_numpy(), frame.index.to_numpy())
         frames.append(frame)
     rows = pd.concat(frames, ignore_index=True)
@@ -94,6 +96,7 @@ def _frames(files: Sequence[DataFile], geometry: Geometry) -> list[pd.DataFrame]
     for file in files:
         frame = file.whole()
         rows = frame.index.to_numpy()
+        check_codes(file.label, frame)
         check_pressure(file.label, file.kind, frame["pressure_kPa"].to_numpy() * KPA, rows)
         if "force_N" in frame:
             check_force(file.label, file.kind, frame["force_N"].to_numpy())

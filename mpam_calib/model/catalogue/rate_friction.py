@@ -116,6 +116,7 @@ register(
         source="logarithmic in speed, relative to the geometric mean of the test's speeds",
         parameters=_parameters,
         apply=_apply,
+        comes_last=True,
         forms={
             "viscous": _viscous,
             "power": _power,

@@ -79,7 +79,7 @@ def _exponent(setting: Setting) -> tuple[Parameter, ...]:
 
 def _spread(length: Array, rest: Rest) -> Array:
     """(R0/R)·(L0/L) of Eq. 2.43: how the pressed surface shrinks to the strands' contact."""
-    length = np.clip(length, SHORTEST * rest.L0, None)
+    length = np.maximum(length, SHORTEST * rest.L0)
     return rest.R0 / radius_inextensible_braid(length, rest) * rest.L0 / length
 
 
