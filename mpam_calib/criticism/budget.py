@@ -12,7 +12,7 @@ from scipy import linalg
 
 from mpam_calib.criticism.fit import Fit
 from mpam_calib.criticism.problem import SIZES, Problem
-from mpam_calib.criticism.refits import Set
+from mpam_calib.criticism.refits import Set, best_of, ended, named_forms
 from mpam_calib.criticism.searched import Search
 
 Array = NDArray[np.float64]
@@ -48,14 +48,12 @@ def structured(problem: Problem, force: Array) -> float:
 
 
 def misfit_budget(found: Search, causes: Set) -> Budget:
-    """Shapley shares of the causes in the misfit that the declared simulation leaves."""
+    """Shapley shares of the causes, in the forms that they have, in the misfit of the declared simulation."""
     problem = found.problem
     worth: dict[Set, float] = {}
-    for k in range(len(causes) + 1):
-        for part in map(frozenset, combinations(sorted(causes), k)):
-            own = structured(problem, found.taken_at_word(part, 0).force)
-            # A cause of size 0 is as good as none: no set leaves more than its parts.
-            worth[part] = min([own, *(worth[part - {e}] for e in part)])
+    for part, own in _at_word(found, causes).items():
+        # A cause of size 0 is as good as none: no set leaves more than its parts.
+        worth[part] = min([own, *(worth[part - {e}] for e in part)])
     before = worth[frozenset()]
     shares = {}
     n = len(causes)
@@ -67,8 +65,7 @@ def misfit_budget(found: Search, causes: Set) -> Budget:
             weight = factorial(len(part)) * factorial(n - len(part) - 1) / factorial(n)
             share += weight * (worth[part] - worth[part | {e}])
         shares[e] = share / before if before > 0.0 else 0.0
-    found.refit(causes, 0)
-    fitted = found.fits[causes, found.best_size(causes)]
+    fitted = found.best_fit(causes)
     return Budget(
         before=float(np.sqrt(before)),
         after=float(np.sqrt(worth[causes])),
@@ -76,6 +73,21 @@ def misfit_budget(found: Search, causes: Set) -> Budget:
         noise=problem.noise_level.total,
         shares=shares,
     )
+
+
+def _at_word(found: Search, causes: Set) -> dict[Set, float]:
+    """Mean square (N²) that the equations of each part of a set leave by themselves, smaller parts first."""
+    found.refit(causes, 0)
+    best = found.best_fit(causes)
+    forms = named_forms(best)
+    parts = [frozenset(p) for k in range(len(causes) + 1) for p in combinations(sorted(causes), k)]
+    chosen = [tuple(forms[e] for e in sorted(part)) for part in parts]
+    tries = [[(names, ended(best)), (names, {})] for names in chosen]
+    fits = found.spread(best_of, [(0, each, False) for each in tries])
+    return {
+        part: np.inf if fitted is None else structured(found.problem, fitted.force)
+        for part, fitted in zip(parts, fits, strict=True)
+    }
 
 
 def remainder_rms(problem: Problem, fitted: Fit) -> float:

@@ -46,8 +46,11 @@ def _why_not(identifier: str, problem: Problem) -> str | None:
         return "no [braid] in specimen.toml"
     readings = problem.middle()
     moving = np.abs(readings.sign) > 0
-    if identifier in MOVING and not (np.any(readings.sign > 0) and np.any(readings.sign < 0)):
-        return "no loops with both branches"
+    if identifier in MOVING:
+        # Presliding needs the way since a turn, which a static point does not know.
+        sign = readings.sign[problem.stroke >= 0] if identifier == "presliding" else readings.sign
+        if not (np.any(sign > 0) and np.any(sign < 0)):
+            return "no loops with both branches"
     if identifier in HISTORY and not problem.has_clock:
         return f"no clock in a {KINDS[0].replace('_', ' ')}"
     if identifier == "stress_softening" and len(problem.cycles) < 2:

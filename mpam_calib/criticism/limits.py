@@ -74,7 +74,7 @@ def _beside(problem: Problem, named: Fit, doubt: Array, further: frozenset[str] 
 
 
 def _band(task: tuple[Fit, Array, str]) -> tuple[float, Band] | None:
-    """The log evidence (up to a constant) and the band; None where no muscle has this effect."""
+    """The log evidence (up to a constant) and the band; None where no muscle, or no reading, has it."""
     named, doubt, form = task
     climb = _beside(held_problem(), named, doubt, frozenset([form]))
     setting = climb.problem.model.setting
@@ -85,6 +85,8 @@ def _band(task: tuple[Fit, Array, str]) -> tuple[float, Band] | None:
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # of shapes that no muscle has
             mode = climb.climb(u, climb.guide(), np.zeros(climb.chain.linear_size))
+            if not np.any(mode.moved[:, climb.names.index(own.name)]):
+                return None
             points, found = _walk(climb, mode, climb.names.index(own.name))
     except (np.linalg.LinAlgError, ValueError):  # scipy's word for slopes that are not finite
         return None

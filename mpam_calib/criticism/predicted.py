@@ -7,10 +7,12 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from mpam_calib.criticism.budget import beyond_noise
-from mpam_calib.criticism.climb import STEP
+from mpam_calib.criticism.climb import NUDGE, STEP
 from mpam_calib.criticism.fit import Fit, chain_for, doubt_about
 from mpam_calib.criticism.problem import SIZES, Problem
 from mpam_calib.model.blueprint import Blueprint
+from mpam_calib.model.chain import SLOPES, Chain
+from mpam_calib.model.effect import Values
 
 Array = NDArray[np.float64]
 
@@ -50,6 +52,19 @@ def _outgrown(problem: Problem, fitted: Fit, train: NDArray[np.intp]) -> float:
     return max(1.0, float(np.sqrt(more)) / (SIZES[-1] * problem.force_scale))
 
 
+def _columns(chain: Chain, values: Values, problem: Problem, force: Array, eta: Array) -> Array:
+    """What the moduli's coordinates make of a force (m,) that may depend on itself, (m, p)."""
+    given = chain.terms(values, problem.readings, force)
+    if not chain.uses_force:
+        return np.asarray(given.columns[0])
+    step = NUDGE * problem.force_scale
+    nudged = chain.terms(values, problem.readings, force + step)
+    moved = nudged.fixed - given.fixed + (nudged.columns - given.columns) @ eta
+    # F = f(F): a change of f is one of F, and that another of f.
+    slope = np.clip(moved / step, *SLOPES)
+    return np.asarray((given.columns / (1.0 - slope)[..., None])[0])
+
+
 def linearise(problem: Problem, fitted: Fit, blueprint: Blueprint | None = None) -> tuple[Array, Array]:
     """Force (n,), the doubt's part in it, and Jacobian (n, d + p + r) at a fit, on all rows of a problem."""
     key = (blueprint or problem.blueprint).model_dump_json()
@@ -63,9 +78,7 @@ def linearise(problem: Problem, fitted: Fit, blueprint: Blueprint | None = None)
     force = np.broadcast_to(chain.force(values, eta, problem.readings), (len(points), 2 * n))
     mean = 0.5 * (force[:, :n] + force[:, n:])
     one = {name: v[:1] for name, v in values.items()}
-    columns = np.broadcast_to(
-        chain.terms(one, problem.readings, force[0]).columns, (1, 2 * n, chain.linear_size)
-    )[0]
+    columns = np.broadcast_to(_columns(chain, one, problem, force[0], fitted.eta), (2 * n, chain.linear_size))
     X = 0.5 * (columns[:n] + columns[n:])
     J = np.concatenate([(mean[1:] - mean[0]).T / STEP, X], axis=1)
     D = doubt_about(problem, key, fitted)

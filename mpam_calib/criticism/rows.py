@@ -16,8 +16,6 @@ from mpam_calib.specimen.recording import Loops
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-MOST_ROWS = 40_000
-"""Raw readings that are kept: whole strokes, from the first on."""
 MOST_STROKES, MOST_POINTS = 90, 600
 """Strokes, and static readings, that are looked at: what a search costs grows with their cube."""
 MIDDLE = 0.9
@@ -38,11 +36,8 @@ class Rows:
 
     @staticmethod
     def of(loops: Loops) -> Rows:
-        """The first strokes of the loops."""
-        keep = pulling(loops)
-        if len(keep) > MOST_ROWS:
-            keep = keep & (loops.stroke < loops.stroke[MOST_ROWS])
-        index = np.flatnonzero(keep)
+        """Those of the loops."""
+        index = np.flatnonzero(pulling(loops))
         readings, rest = rows_and_rest(loops)
         return Rows(readings.take(index), loops.force_N[index], loops.stroke[index], rest[index])
 

@@ -16,8 +16,8 @@ from mpam_calib.criticism.refits import Set
 
 Array = NDArray[np.float64]
 
-LIKELIEST, SINGLES = 5, 4
-"""Partners of a set that lines promise most of, and effects that are tried for being good alone."""
+LIKELIEST = 5
+"""Partners of a set that lines promise most of."""
 LEVEL = 1e-6
 """Share of its power by which a line is damped: lines of one cause are often alike."""
 
@@ -49,7 +49,7 @@ def partners(
     size: int,
     singles: list[str],
 ) -> list[str]:
-    """Effects worth adding to a set: those of which lines promise most, and the best ``singles``.
+    """Effects worth adding to a set: those of which lines promise most, and ``singles``.
 
     By the residual that it leaves beside a remainder of this ``size`` and, where that is known, beside none.
     """
@@ -60,7 +60,7 @@ def partners(
         return sorted(gains, key=lambda p: -gains[p])[:LIKELIEST]
 
     bare = promised(0) if (effects, 0) in fits else promised(size)
-    return list(dict.fromkeys([*promised(size), *bare, *(s for s in singles[:SINGLES] if s in new)]))
+    return list(dict.fromkeys([*promised(size), *bare, *(s for s in singles if s in new)]))
 
 
 def _alone(

@@ -20,7 +20,7 @@ from mpam_calib.criticism.spread import Alone
 
 LEADING_SHARE = 3
 """One in so many of the sets that are extended is extended by every effect."""
-PARTNERS = 8
+PARTNERS = 4
 """Best single effects that are tried as partners of every kept set."""
 SCREENED, BENT = 80, 20
 """Further sets of three that straight lines along the pairs promise most of; so many of them are bent."""
@@ -76,7 +76,7 @@ def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
         tell(0.05 * (size + 1))
     kept = found.kept(1, width)
     found.polish(kept)
-    best = [next(iter(s)) for s in found.kept(1, PARTNERS)]
+    best = [next(iter(s)) for s in found.kept(1, PARTNERS)][:PARTNERS]
     for k in range(2, LARGEST + 1):
         if k == 2 and width >= WIDTH:
             # Small causes show only beside each other: all pairs are worth a look.

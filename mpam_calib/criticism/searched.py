@@ -92,18 +92,6 @@ class Search:
             raise np.linalg.LinAlgError(f"no fit of {sorted(effects)}")
         return self.fits[key]
 
-    def taken_at_word(self, effects: Set, size: int) -> Fit:
-        """The refit of a set whose forms are not doubted: what its equations themselves explain."""
-        if not self.doubting:
-            return self.refit(effects, size)
-        key = (effects, size)
-        if key not in self.searched:
-            (best,) = self.spread(best_of, [(size, self._tries(effects, size), False)])
-            if best is None:
-                raise np.linalg.LinAlgError(f"no fit of {sorted(effects)}")
-            self.searched[key] = best
-        return self.searched[key]
-
     def refit_all(self, keys: Iterable[tuple[Set, int]]) -> None:
         """Refit many sets, each beside a remainder of one size; those that no climb can fit are left out."""
         todo = [key for key in dict.fromkeys(keys) if key not in self.fits]

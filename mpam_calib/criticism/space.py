@@ -23,7 +23,7 @@ def model_space(specimen: Specimen) -> list[Simulation]:
     (:mod:`mpam_calib.criticism.ranking` starts each from the one before).
     """
     declared = specimen.simulation
-    frictions = ["none"]
+    frictions: list[str] = [declared.friction]  # without branches all are one model
     parts = [p for p in (specimen.loops, specimen.force_map) if p is not None]
     if any(np.any(p.branch == 1) and np.any(p.branch == -1) for p in parts):
         frictions = ["coulomb", "none"] + (["strand"] if specimen.braid is not None else [])

@@ -64,7 +64,8 @@ class Verdict:
 
     def likeliest(self) -> int:
         """How many other sets are listed for their probability: five, more that come near, to ten."""
-        return max(LISTED, min(self.near(), 2 * LISTED))
+        among = next(iter(self.probabilities)) != self.standing  # the likeliest is listed itself
+        return max(LISTED, min(self.near() + among, 2 * LISTED))
 
     def near(self) -> int:
         """How many sets, neither the standing one nor the likeliest, come within ``BESIDE`` nats of this."""

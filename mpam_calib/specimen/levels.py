@@ -67,8 +67,10 @@ def stroke_levels(pressure: Floats, units: Ints, steady: np.ndarray[tuple[int], 
     ``pressure`` in Pa; ``units`` numbers the strokes (contiguous runs, from 0); ``steady`` is false
     for rows whose pressure is being changed on purpose (pressurising, depressurising). The
     strokes' medians are clustered; then runs of rows that are clearly at another level (a change
-    of pressure during a hold) are moved there.
+    of pressure during a hold) are moved there. Where nothing but the pressure parts two strokes (each way
+    back was left out), it does.
     """
+    units = _cut_where_wide(pressure, units)
     starts = run_starts(units)
     pieces = np.split(pressure, starts[1:])
     medians = np.array([np.median(piece) for piece in pieces])
@@ -83,6 +85,18 @@ def stroke_levels(pressure: Floats, units: Ints, steady: np.ndarray[tuple[int], 
     own[counts] = label
     own[~counts] = _nearest(medians[~counts], centres)
     return _moved(pressure, own[units], centres)
+
+
+def _cut_where_wide(pressure: Floats, units: Ints) -> Ints:
+    """The strokes, those that go over several levels in pieces."""
+    starts = run_starts(units)
+    pieces = np.split(pressure, starts[1:])
+    spread = np.array([np.ptp(np.quantile(piece, (0.05, 0.95))) for piece in pieces])
+    wide = spread > STROKE_GAPS[1] * np.abs(pressure).max()
+    if not wide.any():
+        return units
+    parts = gap_clusters(pressure, STROKE_GAPS)
+    return run_ids(units, np.where(wide[units], parts, -1))
 
 
 def _nearest(values: Floats, centres: Floats) -> Ints:

@@ -18,6 +18,7 @@ from mpam_calib.specimen.motion import (
     noise_sd,
     number_cycles,
     read_motion,
+    returns,
     run_ids,
     run_starts,
     turn_threshold,
@@ -97,22 +98,24 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
     _check_levels(files, frames, clock, level, levels_Pa)
     if "setpoint_kPa" in everywhere:
         notes += setpoint_notes(rows["setpoint_kPa"].to_numpy() * KPA, level, levels_Pa)
+    displacement = rows["displacement_mm"].to_numpy() * MM
+    returned = returns(displacement, level, branch)
     if "cycle" in everywhere:
         cycle = rows["cycle"].to_numpy().astype(np.int64)
         if "branch" not in everywhere:
             cycle = cycles_at_turns(cycle, run_ids(clock, level), branch)
     else:
-        cycle = number_cycles(level, clock, branch)
+        cycle = number_cycles(level, clock, branch, returned)
     time, began = one_after_the_other(times)
     loops = Loops(
         time_s=time,
         pressure_Pa=pressure,
-        displacement_m=rows["displacement_mm"].to_numpy() * MM,
+        displacement_m=displacement,
         force_N=rows["force_N"].to_numpy(),
         level=level,
         cycle=cycle,
         branch=branch,
-        stroke=run_ids(clock, level, cycle, branch),
+        stroke=run_ids(clock, level, cycle, branch, returned),
         clock=clock,
         began_s=began,
         censored=rows["censored"].to_numpy() > 0.5,

@@ -323,20 +323,29 @@ def run_starts(runs: Ints) -> Ints:
     return np.flatnonzero(np.diff(runs, prepend=-1)).astype(np.int64)
 
 
-def number_cycles(level: Ints, clock: Ints, branch: Ints) -> Ints:
+def returns(displacement: Floats, level: Ints, branch: Ints) -> Ints:
+    """How often (rows,) the crosshead has gone back without a reading: strokes of one direction alone."""
+    back = np.diff(displacement, prepend=displacement[0]) * branch > 0.0
+    far = np.abs(np.diff(displacement, prepend=displacement[0])) > 0.5 * np.ptp(displacement)
+    same = np.diff(level, prepend=level[0]) == 0
+    return np.cumsum(back & far & same).astype(np.int64)
+
+
+def number_cycles(level: Ints, clock: Ints, branch: Ints, returned: Ints) -> Ints:
     """Count cycles from 1 within each level; arrays of shape (rows,) in time order.
 
-    A cycle is one stroke of each direction, in either order, and ends where the level does. Rows
-    without a branch go with the stroke after them, at the end with the one before.
+    A cycle is one stroke of each direction, in either order, and ends where the level does, or where the
+    crosshead has ``returned`` unseen. Rows without a branch go with the stroke after them, at the end with
+    the one before.
     """
-    runs = run_ids(level, clock, branch)
+    runs = run_ids(level, clock, branch, returned)
     starts = run_starts(runs)
     seen: set[int] = set()
     counts: dict[int, int] = {}
-    place: tuple[int, int, int] | None = None
+    place: tuple[int, int, int, int] | None = None
     numbers = np.zeros(len(starts), dtype=np.int64)
     for i, row in enumerate(starts):
-        here = (int(level[row]), int(clock[row]), int(branch[row]))
+        here = (int(level[row]), int(clock[row]), int(branch[row]), int(returned[row]))
         if here[2] == NO_BRANCH:
             continue
         same_stroke = place == here  # parted only by rows without a branch

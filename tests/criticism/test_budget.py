@@ -51,10 +51,13 @@ def test_a_doubted_fit_that_leaves_its_force_to_the_doubt_takes_no_newton_from_a
 
 
 def test_a_climb_that_ended_badly_gives_no_negative_share(found: Search) -> None:
-    search = doubted(found)
-    key = (frozenset(["dead_band"]), 0)
-    search.searched[key] = replace(search.searched[key], force=2.0 * search.searched[key].force)
-    shares = misfit_budget(search, CAUSES).shares
+    alone = found.spread
+
+    def badly(function, tasks):
+        fits = alone(function, tasks)
+        return [replace(f, force=2.0 * f.force) if f.effects == {"dead_band"} else f for f in fits]
+
+    shares = misfit_budget(replace(found, spread=badly), CAUSES).shares
     assert min(shares.values()) >= 0.0
     assert sum(shares.values()) <= 1.0 + 1e-9
 

@@ -298,14 +298,24 @@ def test_turning_points_of_a_million_rows_of_chatter_take_few_passes() -> None:
 def test_cycles_count_within_a_level() -> None:
     level = np.array([0, 0, 0, 0, 1, 1, 0, 0, 0])
     branch = np.array([-1, 1, -1, 1, 1, -1, 0, -1, 1])
-    assert number_cycles(level, np.zeros(9, dtype=int), branch).tolist() == [1, 1, 2, 2, 1, 1, 3, 3, 3]
+    assert number_cycles(level, np.zeros(9, dtype=int), branch, np.zeros(9, dtype=int)).tolist() == [
+        1,
+        1,
+        2,
+        2,
+        1,
+        1,
+        3,
+        3,
+        3,
+    ]
 
 
 def test_one_stroke_in_each_file_still_makes_a_cycle() -> None:
     zeros = np.zeros(4, dtype=int)
     clock = np.array([0, 1, 2, 3])
-    assert number_cycles(zeros, clock, np.array([-1, 1, -1, 1])).tolist() == [1, 1, 2, 2]
-    assert number_cycles(zeros, clock, np.array([-1, -1, 1, 1])).tolist() == [1, 2, 2, 3]
+    assert number_cycles(zeros, clock, np.array([-1, 1, -1, 1]), zeros).tolist() == [1, 1, 2, 2]
+    assert number_cycles(zeros, clock, np.array([-1, -1, 1, 1]), zeros).tolist() == [1, 2, 2, 3]
 
 
 def test_cycles_begin_at_the_turn_beside_them() -> None:
