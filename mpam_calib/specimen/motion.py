@@ -325,10 +325,13 @@ def run_starts(runs: Ints) -> Ints:
 
 def returns(displacement: Floats, level: Ints, branch: Ints) -> Ints:
     """How often (rows,) the crosshead has gone back without a reading: strokes of one direction alone."""
-    back = np.diff(displacement, prepend=displacement[0]) * branch > 0.0
-    far = np.abs(np.diff(displacement, prepend=displacement[0])) > 0.5 * np.ptp(displacement)
+    step = np.diff(displacement, prepend=displacement[0])
+    top, bottom = np.full((2, level.max() + 1), -np.inf)
+    np.maximum.at(top, level, displacement)
+    np.maximum.at(bottom, level, -displacement)
+    far = np.abs(step) > 0.5 * (top + bottom)[level]
     same = np.diff(level, prepend=level[0]) == 0
-    return np.cumsum(back & far & same).astype(np.int64)
+    return np.cumsum((step * branch > 0.0) & far & same).astype(np.int64)
 
 
 def number_cycles(level: Ints, clock: Ints, branch: Ints, returned: Ints) -> Ints:

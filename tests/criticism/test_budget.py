@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.budget import beyond_noise, misfit_budget
+from mpam_calib.criticism.budget import beyond_noise, misfit_budget, structured
+from mpam_calib.criticism.fit import fit
 from mpam_calib.criticism.problem import SIZES
 from mpam_calib.criticism.searched import Search
 from mpam_calib.criticism.spread import Alone
@@ -40,6 +41,16 @@ def test_shares_add_up_to_what_the_causes_explain(found: Search) -> None:
     explained = 1.0 - (budget.after / budget.before) ** 2
     assert sum(budget.shares.values()) == pytest.approx(explained, abs=1e-9)
     assert explained > 0.9
+
+
+def test_it_is_that_of_the_forms_that_are_reported(found: Search) -> None:
+    """Whatever forms the search had before."""
+    search = doubted(found)
+    key = (CAUSES, 0)
+    search.searched[key] = replace(search.searched[key], force=0.0 * search.searched[key].force)
+    at_word = fit(found.problem, search.best_fit(CAUSES).effects, 0)
+    left = structured(found.problem, at_word.force)
+    assert misfit_budget(search, CAUSES).after ** 2 == pytest.approx(left, abs=1e-3)
 
 
 def test_a_doubted_fit_that_leaves_its_force_to_the_doubt_takes_no_newton_from_a_cause(found: Search) -> None:

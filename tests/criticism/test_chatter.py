@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import comb
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mpam_calib.criticism.chatter import chatter_rms
+from mpam_calib.criticism.chatter import FEWEST, SURE, chatter_rms
 from mpam_calib.criticism.fit import fit
 from mpam_calib.criticism.rows import Rows
 from mpam_calib.criticism.search import search
@@ -19,6 +20,11 @@ from .test_hypotheses import problem_of, specimen_of
 from .test_structure import NULLS, left
 
 Array = NDArray[np.float64]
+
+
+def test_so_few_strokes_as_are_compared_can_be_that_sure() -> None:
+    """Of strokes parted without an exception: one order in so many (Mann and Whitney 1947)."""
+    assert 1.0 / comb(2 * FEWEST, FEWEST) < SURE < 1.0 / comb(2 * FEWEST - 2, FEWEST - 1)
 
 
 def even(rows: Rows) -> Array:

@@ -114,6 +114,37 @@ def test_what_cannot_be_tested_is_said(null_problem: Problem) -> None:
     assert f"{null_problem.blueprint.simulation.friction}_friction" not in everything.tested
 
 
+def test_static_points_know_no_way_since_a_turn(null_problem: Problem) -> None:
+    """They may have branches, which friction shows in."""
+    still = replace(null_problem, stroke=np.full_like(null_problem.stroke, -1))
+    assert dict(candidates(still).not_tested)["presliding"] == "no loops with both branches"
+    other = {"coulomb": "strand_friction", "strand": "coulomb_friction", "none": "coulomb_friction"}
+    assert other[still.blueprint.simulation.friction] in candidates(still).tested
+
+
+def test_a_force_that_depends_on_itself_is_linearised_as_it_moves() -> None:
+    """Moduli that add a newton give way by what a fixture gives, too."""
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
+    problem = problem_of(specimen_of(recipe.name))
+    found = fit(problem, frozenset(["rig_compliance"]), 0)
+    chain = chain_for(problem.blueprint.model_dump_json(), found.effects)
+    place = list(found.names).index("compliance_mm_per_N")
+    u = found.u.copy()
+    u[place] = 3.0
+    soft = replace(found, u=u)
+    values = {q.name: q.prior.from_normal(u[i : i + 1, None]) for i, q in enumerate(chain.parameters)}
+    n, d, p = len(problem), len(u), chain.linear_size
+    _, J = linearise(problem, soft)
+    steps = 1e-3 * np.maximum(np.abs(soft.eta), 1e-3)[:, None] * np.eye(p)
+    there, back = (chain.force(values, soft.eta + way * steps, problem.readings) for way in (1.0, -1.0))
+    slopes = 0.5 * (there - back) / np.diagonal(steps)[:, None]
+    exact = 0.5 * (slopes[:, :n] + slopes[:, n:]).T
+    bare = chain.terms(values, problem.readings, chain.force(values, soft.eta[None], problem.readings)[0])
+    stiff = 0.5 * (bare.columns[0, :n] + bare.columns[0, n:])
+    assert np.abs(stiff - exact).max() > 0.02 * np.abs(exact).max()
+    np.testing.assert_allclose(J[:, d : d + p], exact, atol=2e-3 * np.abs(exact).max())
+
+
 def test_friction_that_is_itself_a_cause_may_turn_over_or_depend_on_speed(null_problem: Problem) -> None:
     """Where no friction is declared the one that is found may have every property of one that is."""
     simulation = null_problem.blueprint.simulation.model_copy(update={"friction": "none"})

@@ -177,3 +177,9 @@ def test_small_sizes_of_another_rig_are_inside(share: float, least: int) -> None
             inside.append(low <= share * hidden.size <= high)
     assert len(inside) >= 15
     assert sum(inside) >= least, inside
+
+
+def test_what_moves_no_reading_has_no_band(problem: Problem) -> None:
+    """Without friction there is nothing that presliding could round off."""
+    named = fit(problem, NOTHING, 0)
+    assert set(hidden_sizes(problem, ("presliding", "length_offset"), named)) == {"length_offset"}

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from model.build import loops
 from rig import case as rig_case
 from rig import recipes, sets
 
@@ -32,6 +33,13 @@ def durable() -> Specimen:
     folder = Path(tempfile.mkdtemp())
     rig_case.write_case(recipes.build_case(recipe), folder / "specimen", folder / "truth.json")
     return read(folder / "specimen")
+
+
+def test_long_strokes_are_looked_at_both_ways() -> None:
+    """What a fault does shows in raw readings, however many there are to a stroke."""
+    raw = rows.Rows.of(loops((100.0, 150.0), rows=45_000, dt=1e-3))
+    assert set(raw.readings.sign.tolist()) == {-1.0, 1.0}
+    assert len(np.unique(raw.stroke)) == 4
 
 
 def test_of_many_cycles_the_first_and_the_last_are_looked_at(durable: Specimen) -> None:

@@ -143,6 +143,17 @@ def test_the_declared_simulation_is_always_in_play(law: str, order: int, levels:
     assert len(alone & {"exponential", "exponential_each"}) == 1
 
 
+def test_the_declared_friction_is_in_play_where_no_branch_could_tell_it() -> None:
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
+    specimen = specimen_of(recipe.name)
+    assert specimen.loops is not None
+    declared = specimen.simulation.model_copy(update={"friction": "coulomb"})
+    still = replace(specimen.loops, branch=np.zeros_like(specimen.loops.branch))
+    models = space.model_space(replace(specimen, loops=still, simulation=declared))
+    assert models.count(declared) == 1
+    assert {m.friction for m in models} == {"coulomb"}
+
+
 def test_what_an_effect_adds_is_not_there_twice() -> None:
     """An extended model declares the friction and the kinematics that it found as effects."""
     recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")

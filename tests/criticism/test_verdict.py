@@ -138,6 +138,12 @@ def test_others_are_listed_however_far_behind(margins: range, listed: int, near:
     assert verdict.near() == near
 
 
+def test_a_likeliest_set_that_does_not_stand_takes_no_other_s_place() -> None:
+    behind = {frozenset([f"effect_{m}"]): float(np.exp(-m)) for m in range(9)}
+    verdict = Verdict("unexplained", CAUSE, NOTHING, {CAUSE: 1.0, **behind}, {}, 0)
+    assert list(verdict.others()) == [CAUSE, *behind]
+
+
 @pytest.mark.parametrize(("gap", "listed"), [(9.0, True), (11.0, False)])
 def test_a_further_cause_that_the_data_do_not_exclude_is_listed(
     problem: Problem, gap: float, listed: bool
