@@ -116,7 +116,8 @@ def _missing(specimen: Specimen) -> list[str]:
         missing.append("tensile: the material's own test would separate moduli from static effects")
     if specimen.braid is None and specimen.geometry is not None:
         missing.append(
-            "[braid]: braid_stretch and strand friction cannot be declared, and have no size in diagnose"
+            "[braid]: braid_stretch and strand friction cannot be declared; where diagnose names one, "
+            "its size is stated for nylon strands that it assumes"
         )
     if specimen.geometry is not None and specimen.sensors.force_sd_N is None:
         missing.append("[sensors] force_sd_N: the noise is estimated from the data alone")

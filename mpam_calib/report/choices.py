@@ -48,7 +48,7 @@ def choice_sentences(odds: pd.DataFrame, choice: str) -> list[str]:
             continue
         best = known.iloc[0]
         others = [
-            f"{_named(choice, row['value'])} {against(row[column] - best[column])}"
+            f"{_named(choice, row['value'])} ({against(row[column] - best[column])})"
             for _, row in known.iloc[1:].iterrows()
         ]
         found.append(
@@ -68,11 +68,11 @@ def _neighbours(table: pd.DataFrame) -> list[str]:
     ):
         known = table.dropna(subset=[column]).sort_values("value")
         pairs = [
-            f"{_named('order', high['value'])} against {low['value']}: {against(high[column] - low[column])}"
+            f"{_named('order', high['value'])} against {low['value']} ({against(high[column] - low[column])})"
             for (_, low), (_, high) in zip(known.iloc[:-1].iterrows(), known.iloc[1:].iterrows(), strict=True)
         ]
         if pairs:
-            found.append(f"Each order against the next lower one, {where}: {'; '.join(pairs)}.")
+            found.append(f"Each order against the next lower one, {where}: {', '.join(pairs)}.")
     return found
 
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
@@ -14,7 +13,10 @@ from numpy.typing import NDArray
 from mpam_calib.design.robust import Design, Packed
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.prediction.curves import LIMIT, Reach
-from mpam_calib.report.figures import style
+from mpam_calib.prediction.strain_range import MUSCLE
+from mpam_calib.report.design_bounds import beyond_bounds, within
+from mpam_calib.report.designs_table import contraction_band, designs_of, mean_band, same_design
+from mpam_calib.report.figures import designs as figure
 from mpam_calib.report.numbers import fixed, significant, with_band
 from mpam_calib.report.page import (
     Block,
@@ -32,10 +34,6 @@ from mpam_calib.report.page import (
 from mpam_calib.report.spoken import spoken
 from mpam_calib.units import DEG, KPA, MM
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as MplFigure
-
 Array = NDArray[np.float64]
 
 SHOWN_AT = 200.0 * KPA
@@ -47,7 +45,6 @@ LAWS = {
     "exponential_each": "their exponentials run on, and grow as exponentials do",
     "free": "they are held at the values of the nearest level",
 }
-AIMS = {"posterior_mean": "largest mean", "q05": "largest 5 % quantile"}
 
 
 @dataclass(frozen=True)
@@ -56,7 +53,8 @@ class DesignsView:
 
     ``designs`` in the order of pressure; ``table`` is designs.csv; ``packed`` one for each pressure,
     all with the upper bounds ``radii`` (m) of R_br; ``printed`` Table 3.5's forces (N) by case, one for
-    each pressure; ``draws`` how many stand behind the searches and behind the bands.
+    each pressure; ``draws`` how many stand behind the searches and behind the bands; ``tested`` what the run
+    predicts of the tested muscle itself at these pressures (rows as in predictions.csv).
     """
 
     name: str
@@ -68,6 +66,24 @@ class DesignsView:
     radii: Sequence[float]
     printed: Mapping[str, Array]
     draws: tuple[int, int]
+    tested: pd.DataFrame = field(default_factory=pd.DataFrame)
+
+    @property
+    def of_the_thesis(self) -> bool:
+        """Whether the tested muscle is the thesis's, so that its Table 3.5 is of the same muscle."""
+        own = self.blueprint.geometry
+        return own is not None and own.model_dump(exclude={"sd"}) == MUSCLE.model_dump(exclude={"sd"})
+
+    def tested_force(self, P: float) -> tuple[str, str] | None:
+        """The tested muscle's own blocked force at P (Pa) and its 90 % band (N), where the run gives it."""
+        rows = self.tested
+        if rows.empty:
+            return None
+        here = (rows["quantity"] == "blocked_force_N") & np.isclose(rows["pressure_kPa"], P / KPA)
+        if not here.any():
+            return None
+        row = rows[here].iloc[0]
+        return with_band(float(row["mean"]), float(row["q05"]), float(row["q95"]), float(row["q50"]))
 
     @property
     def levels(self) -> Array:
@@ -137,12 +153,13 @@ def _lead(view: DesignsView) -> list[Block]:
     row = view.pressures.index(P)
     two = view.best("II")[row]
     one = view.best("I")[row]
-    force, force_band = _band(two.force)
-    free, free_band = _contraction(two.contraction)
+    force, force_band = mean_band(two.force)
+    free, free_band = contraction_band(two.contraction)
     sentence = Markup(
-        "At {:.0f} kPa the muscle with the largest expected force (Case II: R {}, t {} mm, α {}°) should "
-        "pull with {} and shorten by {} of its length without load."
+        "Within the thesis's bounds ({}) the muscle with the largest expected force at {:.0f} kPa (Case II: "
+        "R {}, t {} mm, α {}°) should pull with {} and shorten by {} of its length without load."
     ).format(
+        within(),
         P / KPA,
         fixed(two.x[0] / MM, 2),
         fixed(two.x[1] / MM, 3),
@@ -150,43 +167,34 @@ def _lead(view: DesignsView) -> list[Block]:
         spoken(force, force_band, "N"),
         spoken(free, free_band, "%"),
     )
-    value, band = _band(one.force)
+    value, band = mean_band(one.force)
     cautious = view.best("II", "q05")[row]
     q05 = float(np.quantile(cautious.force, 0.05))
-    printed = view.printed["II"][row]
-    return [
-        Headline(sentence),
-        Numbers(
-            [
-                KeyNumber(
-                    "Case II", force, "N", f"90 % band: {force_band} N", "the wall and the angle chosen"
-                ),
-                KeyNumber(
-                    "Case I", value, "N", f"90 % band: {band} N", f"with {one.x[4]:.0f} strands chosen"
-                ),
-                KeyNumber(
-                    "Nineteen in twenty exceed", fixed(q05, 1), "N", note="Case II by its 5 % quantile"
-                ),
-                KeyNumber(
-                    "Thesis, Table 3.5", f"{printed:.2f}", "N", note="Case II, without any uncertainty"
-                ),
-            ]
-        ),
+    cards = [
+        KeyNumber("Case II", force, "N", f"90 % band: {force_band} N", "the wall and the angle chosen"),
+        KeyNumber("Case I", value, "N", f"90 % band: {band} N", f"with {one.x[4]:.0f} strands chosen"),
+        KeyNumber("Nineteen in twenty exceed", fixed(q05, 1), "N", note="Case II by its 5 % quantile"),
     ]
-
-
-def _band(draws: Array) -> tuple[str, str]:
-    low, high = np.quantile(draws, [0.05, 0.95])
-    return with_band(float(draws.mean()), float(low), float(high))
-
-
-def _contraction(draws: Array) -> tuple[str, str]:
-    """Mean and 90 % band of free contractions, in percent; an end where no root was found says so."""
-    value, band = _band(100.0 * draws)
-    if np.quantile(draws, 0.95) < LIMIT - 1e-9:
-        return value, band
-    low = band.split("–")[0]
-    return f"at least {value}", f"{low} to beyond {100 * LIMIT:.0f}"
+    tested = view.tested_force(P)
+    if tested is not None:
+        cards.append(
+            KeyNumber("The tested muscle", tested[0], "N", f"90 % band: {tested[1]} N", "itself, by this run")
+        )
+    if view.of_the_thesis:
+        printed = view.printed["II"][row]
+        cards.append(
+            KeyNumber("Thesis, Table 3.5", f"{printed:.2f}", "N", note="Case II, without any uncertainty")
+        )
+    assert view.blueprint.geometry is not None
+    beyond = beyond_bounds(view.blueprint.geometry)
+    notice: list[Block] = []
+    if beyond:
+        itself = (
+            "" if tested is None else f" It pulls with {tested[0]} N ({tested[1]} N) at {P / KPA:.0f} kPa."
+        )
+        words = "The designs are the best within the bounds, and need not be better than it."
+        notice = [Notice(f"The tested muscle lies outside these bounds: {beyond}.{itself} {words}")]
+    return [Headline(sentence), *notice, Numbers(cards)]
 
 
 def _trust(view: DesignsView) -> Verdict:
@@ -222,28 +230,15 @@ def _trust(view: DesignsView) -> Verdict:
 
 
 def _by_pressure(view: DesignsView) -> Section:
-    rows = []
-    outside = view.reach.outside(np.array(view.pressures))
-    for d in sorted(view.designs, key=lambda d: (d.case, d.P)):
-        i = view.pressures.index(d.P)
-        force, force_band = _band(d.force)
-        free, free_band = _contraction(d.contraction)
-        strands = (fixed(d.x[3] / MM, 2), f"{d.x[4]:.0f}") if len(d.x) == 5 else ("–", "–")
-        geometry = (fixed(d.x[0] / MM, 3), fixed(d.x[1] / MM, 4), fixed(d.x[2] / DEG, 2))
-        printed = f"{view.printed[d.case][i]:.2f}"
-        outcome = (f"{force} ({force_band})", printed, f"{free} ({free_band})", d.held, bool(outside[i]))
-        rows.append((d.case, d.P / KPA, AIMS[d.method], *geometry, *strands, *outcome))
-    names = ["case", "kPa", "aim", "R mm", "t mm", "α °", "R_br mm", "n", "blocked force N"]
-    names += ["Table 3.5 N", "free contraction %", "held by", "extrapolated"]
-    frame = pd.DataFrame(rows, columns=names)
     apart = sorted(
         {
             round(a.P / KPA)
             for case in ("I", "II")
             for a, b in zip(view.best(case), view.best(case, "q05"), strict=True)
-            if not np.allclose(a.x, b.x, rtol=1e-4)
+            if not same_design(a, b)
         }
     )
+    crosses = " Crosses: Table 3.5." if view.of_the_thesis else ""
     words = "Both aims lead to the same design: what raises the mean raises the lower end of the band."
     if apart:
         words = (
@@ -254,29 +249,26 @@ def _by_pressure(view: DesignsView) -> Section:
         "Force and free contraction by pressure",
         [
             Figure(
-                _figure(view),
+                figure.draw(view),
                 "Design of the largest mean at each pressure: median, 50 % and 90 % bands. Dashed: ends of "
-                "the 90 % band of the other aim's design. Crosses: Table 3.5. Grey: outside the recorded "
-                "pressures.",
+                f"the 90 % band of the other aim's design.{crosses} Grey: outside the recorded pressures.",
                 "Blocked force and free contraction against pressure with bands, for both cases.",
             ),
             Text(words),
-            DataTable(frame, "Mean and 90 % band of each design, beside Table 3.5.", {"kPa": "{:.0f}"}),
+            *(designs_of(view, case) for case in ("I", "II")),
         ],
     )
 
 
 def _packing(view: DesignsView) -> Section:
-    names = [f"R_br to {radius / MM:g} mm" for radius in view.radii]
+    names = [f"packed, R_br to {radius / MM:g} mm" for radius in view.radii]
     rows = []
     for item, two in zip(view.packed, view.best("II"), strict=True):
         cells: list[object] = [item.P / KPA, float(two.force.mean()), item.free]
         for x, force in zip(item.x, item.force, strict=True):
-            cells += [force, f"{x[4]:.0f} × {fixed(x[3] / MM, 3)} mm"]
+            cells.append(f"{force:.2f} ({x[4]:.0f} × {fixed(x[3] / MM, 3)} mm)")
         rows.append(cells)
-    columns = ["kPa", "Case II", "Case I"]
-    for name in names:
-        columns += [f"packed, {name}", f"strands, {name}"]
+    columns = ["kPa", "Case II", "Case I", *names]
     i = view.pressures.index(_shown(view))
     item, one, two = view.packed[i], view.best("I")[i], view.best("II")[i]
     whole = float(two.force.mean())
@@ -286,7 +278,7 @@ def _packing(view: DesignsView) -> Section:
     )
     # Half of the strands run each way.
     fit = np.floor(np.pi * one.x[0] * np.sin(one.x[2]) / one.x[3])
-    formats = dict.fromkeys([c for c in columns if not c.startswith("strands")], "{:.2f}") | {"kPa": "{:.0f}"}
+    formats = {"kPa": "{:.0f}", "Case II": "{:.2f}", "Case I": "{:.2f}"} | dict.fromkeys(names, "{}")
     return Section(
         "Strands that fit",
         [
@@ -299,7 +291,11 @@ def _packing(view: DesignsView) -> Section:
                 "real monofilament. The designs in designs.csv are those without this constraint, as in the "
                 "thesis."
             ),
-            DataTable(pd.DataFrame(rows, columns=columns), "Posterior mean of blocked force (N).", formats),
+            DataTable(
+                pd.DataFrame(rows, columns=columns),
+                "Posterior mean of blocked force in N (strands × their radius).",
+                formats,
+            ),
         ],
     )
 
@@ -352,47 +348,3 @@ def _bands(view: DesignsView) -> Section:
             ),
         ],
     )
-
-
-QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-
-
-def _figure(view: DesignsView) -> MplFigure:
-    """Blocked force and free contraction against pressure, one row of panels for each case."""
-    P = np.array(view.pressures) / KPA
-    with style.applied():
-        figure = style.new_figure(5.2)
-        for row, case in enumerate(("I", "II")):
-            left, right = (figure.add_subplot(2, 2, 2 * row + column) for column in (1, 2))
-            mean, other = view.best(case), view.best(case, "q05")
-            for ax, colour, scale, quantity in (
-                (left, style.BLUE, 1.0, "force"),
-                (right, style.GREEN, 100.0, "contraction"),
-            ):
-                style.band(ax, P, _quantiles([getattr(d, quantity) for d in mean]), colour, scale)
-                ends = scale * _quantiles([getattr(d, quantity) for d in other])[["q05", "q95"]].to_numpy()
-                ax.plot(P, ends, "--", color=style.INK, linewidth=0.8)
-                _shade(ax, P, view.levels / KPA)
-                ax.set_ylim(bottom=0.0)
-            left.plot(P, view.printed[case], "x", color=style.INK, markersize=5, label="Table 3.5")
-            left.legend(frameon=False, fontsize=7.5)
-            left.set_title(f"Case {case}: blocked force")
-            right.set_title(f"Case {case}: free contraction")
-            left.set_ylabel("blocked force (N)")
-            right.set_ylabel("contraction without load (%)")
-        for ax in figure.axes[2:]:
-            ax.set_xlabel("pressure (kPa)")
-    return figure
-
-
-def _quantiles(draws: Sequence[Array]) -> pd.DataFrame:
-    """One row of quantiles for each set of draws."""
-    names = [f"q{round(100 * q):02d}" for q in QUANTILES]
-    return pd.DataFrame(np.array([np.quantile(d, QUANTILES) for d in draws]), columns=names)
-
-
-def _shade(ax: Axes, P: Array, levels: Array) -> None:
-    """Grey where the pressure was not recorded."""
-    for low, high in ((float(P.min()), float(levels[0])), (float(levels[-1]), float(P.max()))):
-        if high > low:
-            ax.axvspan(low, high, color=style.GREY, alpha=0.12, linewidth=0)

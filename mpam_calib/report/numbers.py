@@ -36,23 +36,33 @@ def probability(p: float) -> str:
     return "< 0.001" if p < 0.001 else f"{p:.3g}"
 
 
-def with_band(mean: float, low: float, high: float) -> tuple[str, str]:
+def with_band(mean: float, low: float, high: float, median: float | None = None) -> tuple[str, str]:
     """Value and band "low–high", with the decimals that half the band supports.
+
+    A mean outside its own band says nothing of where the value lies: the median stands in for it, marked.
 
     >>> with_band(94.3214, 93.81, 94.9)
     ('94.3', '93.8–94.9')
     >>> with_band(-8.93e7, -9.9e7, -8.1e7)
     ('−8.9×10⁷', '−9.9 – −8.1 ×10⁷')
+    >>> with_band(7.3e16, -1.6e5, 5.9e5, 2.4e5)
+    ('2×10⁵ (median)', '−2 – 6 ×10⁵')
     """
-    largest = max(abs(mean), abs(low), abs(high))
+    outside = math.isfinite(mean) and not low <= mean <= high and low < high
+    value = median if outside else mean
+    largest = max(abs(low), abs(high))
     power = 0
     if math.isfinite(largest) and largest > 0 and not SMALL <= largest < LARGE:
         power = math.floor(math.log10(largest))
     scale = 10.0**-power
     n = decimals(scale * (high - low) / 2.0)
     joint = " – " if low < 0 else "–"
-    text, band = fixed(scale * mean, n), f"{fixed(scale * low, n)}{joint}{fixed(scale * high, n)}"
-    return (f"{text}{ten_to(power)}", f"{band} {ten_to(power)}") if power else (text, band)
+    band = f"{fixed(scale * low, n)}{joint}{fixed(scale * high, n)}"
+    band = f"{band} {ten_to(power)}" if power else band
+    if value is None:
+        return f"{significant(mean, 2)} (mean, outside the band)", band
+    text = f"{fixed(scale * value, n)}{ten_to(power) if power else ''}"
+    return f"{text} (median)" if outside else text, band
 
 
 def ten_to(power: int) -> str:

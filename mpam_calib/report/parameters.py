@@ -23,7 +23,7 @@ def summary_table(view: CalibrationView, names: list[str] | None = None) -> pd.D
         frame = frame.sort_values("parameter", key=lambda column: column.map(order), kind="stable")
     rows = []
     for row in frame.to_dict("records"):
-        mean, band = with_band(float(row["mean"]), float(row["q05"]), float(row["q95"]))
+        mean, band = with_band(float(row["mean"]), float(row["q05"]), float(row["q95"]), float(row["q50"]))
         unit = row["unit"] if isinstance(row["unit"], str) else ""
         rows.append(
             {

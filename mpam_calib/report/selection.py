@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import math
+
 import pandas as pd
+from markupsafe import Markup
 
 from mpam_calib.criticism.select import Selection
 from mpam_calib.report.choices import choices_section
+from mpam_calib.report.numbers import fixed, significant
 from mpam_calib.report.page import Block, DataTable, Headline, Notice, Page, Section, Text, Verdict
 from mpam_calib.report.wording import left_aside
 from mpam_calib.specimen.recording import Specimen
 
 SHOWN = 20
 SURE = 0.95
+CHOICES = ["kinematics", "strain", "order", "law", "friction", "effects"]
+FIGURES = ("probability", "n", "log evidence", "error (N)", "density (nats)")
+RANKING = "Best first. n: parameters; error and log density: of pressure levels that were held out."
+AS_DECLARED = Markup(
+    "Effects are as declared ({}) in every model of this ranking. One that is missing, such as a dead-band, "
+    "shows up here as another order or strain: run <code>mpam-calib diagnose</code> first."
+)
 
 
 def short_name(row: pd.Series) -> str:
@@ -27,33 +38,72 @@ def selection_sentence(models: pd.DataFrame) -> str:
     return f"The data cannot tell: {together} models share {SURE:.0%} of the probability."
 
 
+def held_out_sentence(models: pd.DataFrame) -> tuple[bool, str]:
+    """Whether pressure levels left out prefer the first model too, and what they say.
+
+    Errors of two models on the same rows go together, so that the root of the sum of their squares is the
+    most that their difference can be off by.
+    """
+    held = models.dropna(subset=["elpd_held_out"])
+    first = models.iloc[0]
+    if first.name not in held.index or len(held) < 2:
+        return False, "pressure levels held out say nothing here: too few can be left out"
+    ranked = held.sort_values("elpd_held_out", ascending=False, kind="stable")
+    agrees = bool(ranked.index[0] == first.name)
+    other = ranked.iloc[1 if agrees else 0]
+    apart = abs(float(first["elpd_held_out"] - other["elpd_held_out"]))
+    error = math.hypot(first["elpd_held_out_se"], other["elpd_held_out_se"])
+    by = f"{fixed(apart, 1)} nats, standard error up to {fixed(error, 1)}"
+    winner = "the same model" if agrees else short_name(other)
+    if apart >= error:
+        return agrees, f"held-out pressure levels prefer {winner} ({by})"
+    unclear = f"that does not tell it apart from {short_name(other if agrees else first)}"
+    return agrees, f"held-out pressure levels put {winner} first, but {unclear} ({by})"
+
+
+def ranking_table(models: pd.DataFrame) -> tuple[pd.DataFrame, str]:
+    """The ranking for print, and a sentence on the choices that are the same in all its models."""
+    first = models.iloc[0]
+    constant = [c for c in CHOICES if len(models) > 1 and (models[c] == first[c]).all()]
+    table = models[[c for c in CHOICES if c not in constant]].copy()
+    table["probability"] = [f"{p:.3g}" for p in models["probability"]]
+    table["n"] = models["n_parameters"]
+    table["log evidence"] = _with_errors(models, "log_evidence", 2)
+    errors = models["rmse_held_out_N"].astype(float)
+    table["error (N)"] = [significant(x) for x in errors]
+    table["density (nats)"] = _with_errors(models, "elpd_held_out", 1)
+    same = ", ".join(f"{c} {first[c] or 'none'}" for c in constant)
+    return table, f" The same in all of these: {same}." if same else ""
+
+
+def _with_errors(models: pd.DataFrame, column: str, digits: int) -> list[str]:
+    """Values "v ± error", or without what is not known."""
+    found = []
+    for value, error in zip(models[column].astype(float), models[f"{column}_se"].astype(float), strict=True):
+        known = f" ± {error:.1g}" if error < 1.0 else f" ± {error:.0f}"
+        found.append(fixed(value, digits) + ("" if math.isnan(error) else known))
+    return found
+
+
 def selection_page(found: Selection, specimen: Specimen) -> Page:
     """The page for one selection."""
     models = found.models
-    best = models.iloc[0]
-    sure = float(best["probability"]) >= SURE
-    held = models.dropna(subset=["elpd_held_out"])
-    reasons = [f"the best model by evidence has probability {best['probability']:.3g}"]
-    if len(held):
-        winner = held.iloc[int(held["elpd_held_out"].to_numpy().argmax())]
-        same = "the same model" if winner.name == best.name else short_name(winner)
-        reasons.append(f"held-out pressure levels prefer {same}")
+    sure = float(models["probability"].iloc[0]) >= SURE
+    agrees, said = held_out_sentence(models)
+    reasons = [f"the best model by evidence has probability {models['probability'].iloc[0]:.3g}", said]
     lead: list[Block] = [
         Headline(selection_sentence(models)),
-        Verdict("Model selection", "good" if sure else "caution", reasons),
+        Verdict("Model selection", "good" if sure and agrees else "caution", reasons),
+        Notice(AS_DECLARED.format(", ".join(specimen.simulation.effects) or "none")),
     ]
     lead += [Notice(text) for text in left_aside(specimen, "ranking")]
     names = [short_name(models.iloc[i]) for i in range(len(found.confusion))]
-    ranks = {
-        "log_evidence": "{:.2f}", "log_evidence_se": "{:.2g}", "probability": "{:.3g}",
-        "rmse_held_out_N": "{:.3g}",
-        "elpd_held_out": "{:.1f}", "elpd_held_out_se": "{:.1f}",
-    }  # fmt: skip
+    table, same = ranking_table(models.head(SHOWN))
     sections = [
         Section(
             "Ranking",
             [
-                DataTable(models.head(SHOWN), "Best first", ranks),
+                DataTable(table, f"{RANKING}{same}", dict.fromkeys(FIGURES, "{}")),
                 Text(
                     "Evidence of the leading models is by bridge sampling, with its error; quadrature "
                     f"differs from it by at most {found.disagreement:.2g} nats. That of models with a rate "

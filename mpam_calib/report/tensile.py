@@ -32,14 +32,14 @@ def tensile_lead(view: CalibrationView) -> list[Block]:
     top, middle = rows.iloc[-1], rows.iloc[(len(rows) - 1) // 2]
     cards, parts = [], []
     for row in (middle, top):
-        value, band = with_band(*(1e-3 * float(row[q]) for q in ("mean", "q05", "q95")))
+        value, band = with_band(*(1e-3 * float(row[q]) for q in ("mean", "q05", "q95", "q50")))
         strain = f"{row['contraction']:.3g}"
         parts.append(spoken(value, band, "kPa", f" at a strain of {strain}"))
         cards.append(KeyNumber(f"Stress at strain {strain}", value, "kPa", f"90 % band: {band} kPa"))
     first = view.summary[view.summary["parameter"] == "E_1"]
     if len(first):
         row = first.iloc[0]
-        value, band = with_band(*(1e-3 * float(row[q]) for q in ("mean", "q05", "q95")))
+        value, band = with_band(*(1e-3 * float(row[q]) for q in ("mean", "q05", "q95", "q50")))
         cards.append(
             KeyNumber("First modulus E_1", value, "kPa", f"90 % band: {band} kPa", "slope at small strain")
         )

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mpam_calib.calibration import predict
 from mpam_calib.design.problem import R_BR
 from mpam_calib.design.robust import Optimiser, designs_table
 from mpam_calib.errors import InputError
@@ -51,6 +52,7 @@ def optimize_to_folder(run: Path, seed: int = 0) -> tuple[Path, Path]:
             for case in ("I", "II")
         },
         draws=(len(optimiser.few), len(optimiser.many)),
+        tested=predict(model, stored.draws, stored.seed, [P / KPA for P in pressures]),
     )
     page = designs_page(view)
     write_csv(frame, run / TABLE)

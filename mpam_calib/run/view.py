@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -46,6 +48,7 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
     observed, remainder, noise = _observed(calibration)
     headline = _headline(calibration)
     draws = {item.name: item.draws for item in calibration.reported if item.name in headline}
+    prior = prior_draws(model, [item.name for item in calibration.reported], calibration.seed)
     return CalibrationView(
         name=specimen.name,
         material=specimen.bladder_material,
@@ -68,10 +71,10 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
         ),
         levels_kPa=tuple(_in_kpa(specimen.levels_Pa)),
         draws=draws,
-        prior_draws=prior_draws(model, headline, calibration.seed),
+        prior_draws={name: prior[name] for name in prior if name in headline},
         headline=headline,
         meanings={item.name: item.meaning for item in calibration.reported},
-        unidentified=_learnt(summary),
+        unidentified=_learnt(summary, {i.name: i.draws for i in calibration.reported}, prior),
         left_out=levels_left_out(specimen, calibration.target, calibration.draws, calibration.seed),
         strain_range=strain_range_table(specimen, model, calibration.draws, calibration.seed)
         if model.setting is None
@@ -109,23 +112,33 @@ def _headline(calibration: Calibration) -> list[str]:
     return [*physics, *coefficients[:room], *rest][:8]
 
 
-def _learnt(summary: pd.DataFrame) -> pd.DataFrame:
-    """What each physical parameter's posterior owes to the data.
+def _learnt(
+    summary: pd.DataFrame, posterior: Mapping[str, Array], prior: Mapping[str, Array]
+) -> pd.DataFrame:
+    """What each physical parameter's posterior owes to the data: how much narrower its 90 % band became.
 
-    Amplitudes of noise and remainder are left out: what they tell is where they lie, not how narrow
-    they are beside their priors.
+    Not how much smaller its sd: one far draw of a heavy tail makes a prior's sd as large as one likes.
+    Amplitudes of noise and remainder are left out: what they tell is where they lie, not how narrow they are
+    beside their priors.
     """
     summary = summary[~summary["parameter"].isin(NOT_PHYSICS)]
-    ratio = summary["sd"] / summary["prior_sd"].replace(0.0, np.nan)
+    before = np.array([_width(prior[name]) for name in summary["parameter"]])
+    after = np.array([_width(posterior[name]) for name in summary["parameter"]])
+    ratio = np.divide(after, before, out=np.ones_like(after), where=before > 0.0)
     return pd.DataFrame(
         {
             "parameter": summary["parameter"],
             "prior_sd": summary["prior_sd"],
             "posterior_sd": summary["sd"],
-            "contraction": (1.0 - ratio).fillna(0.0),
+            "contraction": 1.0 - ratio,
             "sentence": "",
         }
     )
+
+
+def _width(draws: Array) -> float:
+    low, high = np.quantile(draws, [0.05, 0.95])
+    return float(high - low)
 
 
 def _settings(calibration: Calibration) -> dict[str, str]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from criticism.test_hypotheses import problem_of, specimen_of
 
 from mpam_calib.model.effect import effect
-from mpam_calib.report.diagnosis import BENT, _causes, _unproven
-from mpam_calib.report.page import DataTable, Text
+from mpam_calib.report.diagnosis import BENT, FORMS, _alternatives, _causes, _next, _unproven
+from mpam_calib.report.page import DataTable, Notice, Text
 
 HOLDS = {
     "held_out": "cycle",
@@ -90,3 +92,27 @@ def test_a_cause_whose_equation_is_open_is_told(probability: float, open_: bool)
     text, _ = _causes([cause], {})
     assert isinstance(text, Text)
     assert ("other equations open for: creep." in text.html) == open_
+
+
+def test_other_sets_are_counted_without_a_word_that_the_table_contradicts() -> None:
+    """Sets at < 0.001 under a cause at > 0.999 are not hard to tell from it."""
+    verdict = SimpleNamespace(near=lambda: 4, likeliest=lambda: 5)
+    alternatives = [{"ids": ["dead_band", "presliding"], "probability": 1e-4}]
+    content: dict[str, Any] = {"alternatives": alternatives, "causes": [{"id": "dead_band"}]}
+    text, _ = _alternatives(content, SimpleNamespace(verdict=verdict))  # type: ignore[arg-type]
+    assert isinstance(text, Text)
+    assert "within 10 nats of the likeliest (a factor of 22,000 in probability): 4." in text.html
+    assert "hardly" not in text.html
+
+
+def test_the_stated_share_of_true_sets_is_that_of_the_documents() -> None:
+    documents = Path(__file__).parents[2] / "docs" / "how_far_to_trust_a_diagnosis.md"
+    assert "six of seven" in documents.read_text(encoding="utf-8")
+    assert "six of seven" in FORMS
+
+
+def test_what_comes_next_is_told_where_an_extended_model_holds_a_cause() -> None:
+    (notice,) = _next([{"id": "dead_band"}])
+    assert isinstance(notice, Notice)
+    assert "mpam-calib calibrate RUN/extended -o" in notice.html
+    assert _next([]) == []

@@ -94,7 +94,7 @@ def test_each_method_is_best_at_its_own_aim(designs: pd.DataFrame) -> None:
 def test_report_says_first_that_it_extrapolates(optimised: Path) -> None:
     text = (optimised / "designs.html").read_text(encoding="utf-8")
     body = text[text.index("<main") if "<main" in text else 0 :]
-    assert body.index("Extrapolated.") < body.index("At 200 kPa the muscle with the largest")
+    assert body.index("Extrapolated.") < body.index("Within the thesis's bounds (R 0.45–3 mm")
     assert "Moduli fitted at one R and t need not hold at another" in text
     assert "50, 300, 400, 500, 600 kPa lie outside the recorded pressures" in text
     assert "declares no sd of the braid angle" in text

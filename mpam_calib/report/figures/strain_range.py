@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from typing import TYPE_CHECKING
 
 from mpam_calib.report.figures import style
@@ -12,6 +13,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_PANELS = 8
+TITLE = 22
+"""Characters of a panel's title that fit its width."""
+SHARE = "share of length"
+"""What an axis says whose quantity has no unit."""
 
 
 def draw(view: CalibrationView) -> Figure:
@@ -23,10 +28,12 @@ def draw(view: CalibrationView) -> Figure:
     ranges = list(dict.fromkeys(zip(frame["strain_low"], frame["strain_high"], strict=True)))
     columns = min(4, len(quantities))
     rows = math.ceil(len(quantities) / columns)
+    titles = [textwrap.fill(str(quantity), TITLE) for quantity in quantities]
+    lines = max(title.count("\n") for title in titles)
     with style.applied():
-        figure = style.new_figure(rows * (0.8 + 0.28 * len(ranges)) + 0.3)
+        figure = style.new_figure(rows * (0.8 + 0.15 * lines + 0.28 * len(ranges)) + 0.3)
         panels = list(figure.subplots(rows, columns, squeeze=False, sharey=True).flat)
-        for ax, quantity in zip(panels, quantities, strict=False):
+        for ax, quantity, title in zip(panels, quantities, titles, strict=False):
             mine = frame[frame["quantity"] == quantity]
             for low, high, used, mean, q05, q95 in mine[
                 ["strain_low", "strain_high", "used", "mean", "q05", "q95"]
@@ -41,9 +48,8 @@ def draw(view: CalibrationView) -> Figure:
                     markerfacecolor=style.BLUE if used else "white",
                     markersize=5,
                 )
-            unit = str(mine["unit"].iloc[0])
-            ax.set_title(str(quantity), fontsize=8.5)
-            ax.set_xlabel(unit)
+            ax.set_title(title, fontsize=8.5)
+            ax.set_xlabel(str(mine["unit"].iloc[0]) or SHARE)
             ax.set_yticks(range(len(ranges)), [f"{low:g} to {high:g}" for low, high in ranges])
             ax.set_ylim(len(ranges) - 0.5, -0.5)
             ax.xaxis.set_major_locator(MaxNLocator(4))

@@ -1,0 +1,78 @@
+"""What the selection page says: levels held out beside evidence, effects not in play, readable odds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from criticism.test_hypotheses import specimen_of
+
+from mpam_calib.criticism.held_out import LEVEL_COLUMNS
+from mpam_calib.criticism.odds import odds
+from mpam_calib.criticism.select import COLUMNS, Selection
+from mpam_calib.report.choices import choice_sentences
+from mpam_calib.report.page import DataTable, Notice, Page, Verdict
+from mpam_calib.report.selection import ranking_table, selection_page
+
+SPECIMEN = specimen_of("develop-null-006")
+
+
+def models(*held: tuple[float, float]) -> pd.DataFrame:
+    """Models of order 1, 2, ..., 10 nats apart; ``held``: density and error of levels left out."""
+    rows: list[list[Any]] = []
+    for i, (elpd, error) in enumerate(held):
+        one = ["inextensible_braid", "stretch", i + 1, "constant", "coulomb", "", i + 2]
+        rows.append([*one, -10.0 * i, 0.01, float(np.exp(-10.0 * i)), 0.5, elpd, error])
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def page(table: pd.DataFrame) -> Page:
+    widths = [(i + 1, "as declared", 0.0, 1.0) for i in range(len(table))]
+    sensitivity = pd.DataFrame(widths, columns=["model", "prior", "log_evidence", "probability"])
+    levels = pd.DataFrame(columns=["model", *LEVEL_COLUMNS])
+    chances = odds(table, SPECIMEN.simulation)
+    found = Selection(table, chances, levels, np.eye(len(table)), 0, sensitivity, 0.01)
+    return selection_page(found, SPECIMEN)
+
+
+@pytest.mark.parametrize(
+    ("held", "level", "said"),
+    [
+        (((-100.0, 1.0), (-110.0, 1.0)), "good", "prefer the same model"),
+        (((-100.0, 8.0), (-101.0, 8.0)), "good", "does not tell it apart from"),
+        (((-110.0, 1.0), (-100.0, 1.0)), "caution", "prefer inextensible_braid, stretch, M = 2"),
+        (((-104.2, 8.6), (-100.0, 9.6)), "caution", "M = 2, constant, coulomb first, but that does not tell"),
+        (((float("nan"), float("nan")),) * 2, "caution", "say nothing here"),
+    ],
+)
+def test_the_box_is_green_only_where_levels_left_out_agree(
+    held: tuple[tuple[float, float], ...], level: str, said: str
+) -> None:
+    (verdict,) = (b for b in page(models(*held)).lead if isinstance(b, Verdict))
+    assert verdict.level == level
+    assert any(said in reason for reason in verdict.reasons)
+
+
+def test_effects_are_said_to_be_as_declared_and_diagnose_to_come_first() -> None:
+    shown = page(models((-100.0, 1.0), (-110.0, 1.0)))
+    (words,) = (b.html for b in shown.lead if isinstance(b, Notice) and "as declared" in b.html)
+    assert "dead-band" in words and "<code>mpam-calib diagnose</code> first" in words
+
+
+def test_choices_that_all_models_share_leave_the_table() -> None:
+    shown = page(models((-100.0, 1.0), (-110.0, 1.0)))
+    (table,) = (b for b in shown.sections[0].blocks if isinstance(b, DataTable))
+    assert list(table.frame.columns)[:2] == ["order", "probability"]
+    assert "strain stretch, law constant, friction coulomb, effects none" in table.caption
+    assert table.rows[0][3:] == ["0.00 ± 0.01", "0.500", "−100.0 ± 1"]
+    alone, same = ranking_table(models((-100.0, 1.0)))
+    assert "strain" in alone.columns and same == ""
+
+
+def test_each_model_stands_apart_from_its_odds() -> None:
+    table = odds(models((0.0, 1.0), (0.0, 1.0)), SPECIMEN.simulation)
+    said = " ".join(choice_sentences(table, "order"))
+    assert "M = 2 (1 to 10⁴)" in said or "M = 2 (1 to 22026)" in said
+    assert "M = 2 against 1 (" in said
