@@ -21,6 +21,7 @@ from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Sampling, sample
 from mpam_calib.posterior.summary import all_converged, summarise
 from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.bands import muscle_bands, stress_bands
+from mpam_calib.specimen.arguments import demand_number, demand_specimen, demand_whole
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import KPA
 
@@ -95,9 +96,13 @@ def calibrate(
     """Draw the posterior of a specimen's declared simulation.
 
     ``material`` is what ``moduli = "run:..."`` names; it is read from there where it is not given.
-    Raises ``InputError`` where the specimen cannot carry the model. See ``Calibration.converged`` for
-    whether the draws can be used.
+    Raises ``InputError`` where the specimen cannot carry the model, and for options that mean nothing. See
+    ``Calibration.converged`` for whether the draws can be used.
     """
+    demand_specimen(specimen)
+    demand_whole("--seed", seed, 0)
+    demand_whole("--max-steps", max_steps, 1)
+    demand_number("--ess", ess_wanted, 1.0)
     if material is None:
         material = material_of(specimen)
     target = build_target(specimen, draw_blueprint(specimen, options, material))

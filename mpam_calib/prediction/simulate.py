@@ -11,14 +11,18 @@ from numpy.typing import NDArray
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Blueprint, draw_blueprint
 from mpam_calib.model.effect import effect, known_effects
-from mpam_calib.model.model import Model, build_model
+from mpam_calib.model.model import CONTRACTION_SD, Model, build_model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.readings import Readings
+from mpam_calib.model.remainder import ROUGH, SMOOTH
+from mpam_calib.model.tensile import MISFIT, NOISE
+from mpam_calib.posterior.draws import Draws, reported
 from mpam_calib.posterior.material import material_of
 from mpam_calib.posterior.row_motion import row_readings
 from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.curves import contraction_grid, first_root
 from mpam_calib.prediction.protocol import LEVELS, thesis_protocol
+from mpam_calib.specimen.arguments import demand_specimen, demand_whole, is_number
 from mpam_calib.specimen.recording import ForceMap, Loops, Specimen
 from mpam_calib.units import si_factor
 
@@ -28,6 +32,8 @@ THESIS_FRICTION = {"K_f": 0.0787, "f_s": 0.15}
 """Friction of a specimen without data: mean of thesis Table 4.10; the text to Fig. 4.20."""
 THESIS_FORCE_SD = 0.25
 """N; 0.1 % of the thesis's 250 N load cell."""
+NOT_PUT_IN = (SMOOTH, ROUGH, NOISE, MISFIT, CONTRACTION_SD)
+"""Parameters of what is not simulated: the remainder, and other files' readings."""
 FRICTIONS = {"coulomb_friction", "strand_friction"}
 OF_FRICTION = {"presliding", "rate_friction"}
 """Effects that are a friction, and those that only change one."""
@@ -39,7 +45,10 @@ FARTHEST = 6.0
 
 @dataclass(frozen=True)
 class Simulated:
-    """Synthetic recordings and the truth behind them (lab units)."""
+    """Synthetic recordings and the truth behind them (lab units).
+
+    ``parameters`` holds all that was put in, under the names of ``summary.csv``.
+    """
 
     specimen: Specimen
     hidden: dict[str, dict[str, float]]
@@ -55,6 +64,9 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
     is unknown, is part of the simulation, has no size to hide, or lacks what it needs, and for a size that
     its prior all but rules out.
     """
+    demand_specimen(specimen)
+    demand_whole("--seed", seed, 0)
+    hide = _checked(hide)
     rng = np.random.default_rng([seed, 8])
     fitted = specimen.has_muscle_data
     if not fitted and (specimen.geometry is None or specimen.simulation.E_Pa is None):
@@ -80,7 +92,7 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
         model = build_model(blueprint)
         values = _without_data(model)
         eta = np.zeros((1, sum(model.linear_sizes)))
-    model, hidden = _with_hidden(blueprint, values, hide or {}, specimen)
+    model, hidden = _with_hidden(blueprint, values, hide, specimen)
     assert model.chain is not None
     eta = eta[:, : model.linear_sizes[0]]
     loops, grid = specimen.loops, specimen.force_map
@@ -101,8 +113,27 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
         free_contraction=None,
         tensile=specimen.tensile,
     )
-    shown = {name: float(v[0, 0] / si_factor(name)) for name, v in values.items()}
-    return Simulated(result, hidden, shown)
+    return Simulated(result, hidden, _put_in(model, values, eta))
+
+
+def _put_in(model: Model, values: dict[str, Array], eta: Array) -> dict[str, float]:
+    """What was put in, lab units: the moduli with everything else that ``summary.csv`` would list."""
+    # What a hidden effect takes the place of (a declared sd's parameter) still acts as fitted.
+    shown = {k: float(v[0, 0] / si_factor(k)) for k, v in values.items() if k not in model.names}
+    drawn = Draws(np.zeros((1, len(model.names))), values, eta, 1)
+    shown |= {item.name: float(item.draws[0]) for item in reported(model, drawn)}
+    return {name: value for name, value in shown.items() if name not in NOT_PUT_IN}
+
+
+def _checked(hide: object) -> Mapping[str, float | None]:
+    """What is to be hidden, where it is ids with sizes."""
+    expected = 'effect ids with sizes, such as {"dead_band": 7.5}, None for a typical one'
+    if not isinstance(hide, Mapping | None):
+        raise InputError("--hide", f"{type(hide).__name__} {str(hide)[:40]}", expected)
+    for name, size in (hide or {}).items():
+        if not isinstance(name, str) or not (size is None or is_number(size)):
+            raise InputError("--hide", f"{name}={size!r}", expected)
+    return hide or {}
 
 
 def _without_data(model: Model) -> dict[str, Array]:

@@ -13,6 +13,7 @@ from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Progress
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.run.files import KEPT_FILE, demand_folder
 from mpam_calib.run.folder import REPORT, RunFolder, run_digest
+from mpam_calib.run.replaced import tell_replaced
 from mpam_calib.specimen import read
 
 
@@ -59,6 +60,7 @@ def calibrate_to_folder(
         cut = bool(state["sampling"].get("cut", False))
         if max_steps <= used or (state["converged"] and not cut):
             return Outcome(bool(state["converged"]), kept=True)
+    tell_replaced(run, "calibration")
     tell = listener or (lambda progress: None)
     tell(Progress("fitting", 0, float("nan"), 0.0, 0.0))
     with folder.checkpoint.resumable():

@@ -17,6 +17,7 @@ from mpam_calib.report.diagnosis import diagnosis_page
 from mpam_calib.run.files import KEPT_FILE, UNFINISHED, demand_folder, write_json
 from mpam_calib.run.folder import run_digest
 from mpam_calib.run.kept import Kept
+from mpam_calib.run.replaced import tell_replaced
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.specimen.toml_source import SPECIMEN_FILE
@@ -42,6 +43,7 @@ def diagnose_to_folder(
     if kept.finished():
         return None
     _demand_extended(source, run)
+    tell_replaced(run, "diagnosis")
     with kept.unfinished.resumable():
         found = diagnose(specimen, material=material, tell=tell, journal=Journal(kept.unfinished))
     kept.begin()

@@ -13,6 +13,7 @@ from mpam_calib.report.selection import selection_page
 from mpam_calib.run.files import KEPT_FILE, demand_folder, write_csv
 from mpam_calib.run.folder import run_digest
 from mpam_calib.run.kept import Kept
+from mpam_calib.run.replaced import tell_replaced
 from mpam_calib.specimen import read
 
 FILES = ("models.csv", "prior_sensitivity.csv", "report.html")
@@ -40,6 +41,7 @@ def select_to_folder(
     kept = Kept(run, "select", digest, FILES)
     if kept.finished():
         return None
+    tell_replaced(run, "selection")
     journal = Journal(kept.unfinished)
     with kept.unfinished.resumable():
         found = select(

@@ -67,8 +67,11 @@ def check_parts(source: TomlSource, declaration: Declaration, *, data_required: 
         raise fault(source, ["geometry"], "no table [geometry]", expected)
     if muscle and declaration.geometry is not None and declaration.geometry.alpha0_deg <= CONTRACTS_DEG:
         given = declaration.geometry.alpha0_deg
-        found = f"{given:g}, a braid that lengthens under pressure (the angle from the axis?)"
-        expected = f"above {CONTRACTS_DEG:.1f} degrees from the hoop direction ({90.0 - given:g}?)"
+        radians = CONTRACTS_DEG <= math.degrees(given) <= 90.0
+        meant = f"{math.degrees(given):.1f}" if radians else f"{90.0 - given:g}"
+        guess = "radians?" if radians else "the angle from the axis?"
+        found = f"{given:g}, a braid that lengthens under pressure ({guess})"
+        expected = f"above {CONTRACTS_DEG:.1f} degrees from the hoop direction ({meant}?)"
         raise fault(source, ["geometry", "alpha0_deg"], found, expected)
     strain = declaration.fit.tensile_strain
     if strain is not None and not declaration.files.of("tensile"):

@@ -9,7 +9,7 @@ import pandas as pd
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import FileKind, Geometry
-from mpam_calib.specimen.motion import turn_threshold, turning_points
+from mpam_calib.specimen.motion import RANGE_SHARE, turn_threshold, turning_points
 from mpam_calib.specimen.recording import Floats, Ints
 from mpam_calib.units import ATMOSPHERE, KPA, MM
 
@@ -17,6 +17,8 @@ HIGHEST_LEVEL_KPA = 5000.0
 HIGHEST_STRAIN = 20.0
 LEAST_STROKE = 0.005
 """Smaller largest displacements, as a share of L0, are taken for metres, or lengthening for shortening."""
+LEAST_ROWS = 4
+"""Rows that a stroke needs, for the way it goes to be told from noise."""
 LONG_SHARE = 0.1
 """Share of the rows that are taken as those where the muscle is long."""
 MOST = {"force_N": 1e6, "pressure_kPa": 1e9, "displacement_mm": 1e5, "contraction": 1e2, "stress_Pa": 1e10}
@@ -112,22 +114,39 @@ def check_strain(label: str, strain: Floats, rows: Ints) -> None:
 def check_displacement(
     label: str, displacement_m: Floats, rows: Ints, geometry: Geometry, *, held: bool
 ) -> None:
-    """Refuse a displacement that never moves (unless ``held`` on purpose), is in metres or impossible."""
+    """Refuse a displacement that never moves (unless ``held`` on purpose), has few rows, another unit, or
+    is impossible."""
     column = "displacement_mm"
     millimetres = displacement_m / MM
     if not held:
         if len(turning_points(displacement_m, turn_threshold(displacement_m))) < 2:
-            found = f"a displacement that never moves ({millimetres[0]:g} throughout)"
-            expected = "loops over length, or branch pressurising/depressurising at held length"
-            raise InputError(label, found, expected, None, column)
+            raise _unmoved(label, millimetres, LEAST_STROKE * geometry.L0_mm)
         largest = float(millimetres.max())
         if largest < LEAST_STROKE * geometry.L0_mm:
             flipped = millimetres.min() <= -LEAST_STROKE * geometry.L0_mm
-            found = f"a largest displacement of {largest:.3g} mm ({'flipped sign' if flipped else 'metres'}?)"
-            hint = map_hint("loops", column, "-1.0" if flipped else "1000.0")
+            guess, scale = ("flipped sign", "-1.0") if flipped else ("metres", "1000.0")
+            if not flipped and largest / MM >= geometry.L0_mm:
+                guess, scale = "a share of L0", f"{geometry.L0_mm:.1f}"
+            found = f"a largest displacement of {largest:.3g} mm ({guess}?)"
+            hint = map_hint("loops", column, scale)
             expected = f"at least {LEAST_STROKE:g} of L0 = {geometry.L0_mm:g} mm; {hint}"
             raise InputError(label, found, expected, None, column)
     check_contraction(label, displacement_m / geometry.L0, rows, geometry, "loops", column)
+
+
+def _unmoved(label: str, millimetres: Floats, least: float) -> InputError:
+    """Why no stroke is seen: too few rows for each, where it moves by ``least`` (mm), or none is there."""
+    low, high = float(millimetres.min()), float(millimetres.max())
+    strokes = len(turning_points(millimetres, RANGE_SHARE * (high - low))) - 1
+    if high - low >= least and len(millimetres) < LEAST_ROWS * strokes:
+        found = f"{len(millimetres)} rows for {strokes} strokes, too few to see which way each goes"
+        expected = f"at least {LEAST_ROWS} rows a stroke"
+    else:
+        span = f"{low:g} throughout" if low == high else f"{low:g} to {high:g}, no more than it scatters"
+        found = f"a displacement that never moves ({span})"
+        expected = "loops over length"
+    expected += ", or branch pressurising/depressurising at held length"
+    return InputError(label, found, expected, None, "displacement_mm")
 
 
 def longest_contraction(geometry: Geometry) -> float:

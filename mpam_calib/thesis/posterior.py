@@ -6,6 +6,7 @@ put their bands beside the printed numbers.
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,8 +16,10 @@ from numpy.typing import NDArray
 
 from mpam_calib.arviz_import import import_arviz
 from mpam_calib.errors import InputError
+from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.thesis import decoded, friction
 from mpam_calib.thesis.tables import table
+from mpam_calib.units import DEG, MM
 
 Array = NDArray[np.float64]
 
@@ -30,6 +33,15 @@ COMPARED_AT = {"Blocked Force (N)": (300.0, 250.0), "Free Contraction (%)": (250
 
 MPAM1, MPAM2, MPAM1_STRAND = "MPAM1", "MPAM2", "MPAM1, strand friction"
 """The runs that the reproduction can show."""
+GEOMETRY = {
+    "L0_mm": decoded.L0 / MM,
+    "R0_mm": decoded.R0 / MM,
+    "t0_mm": decoded.T0 / MM,
+    "alpha0_deg": decoded.ALPHA0 / DEG,
+}
+"""That of both muscles."""
+MATERIALS = {MPAM1: "Ecoflex 00-50", MPAM2: "PDMS + Ecoflex 00-30 (1:10)"}
+"""What tells one from the other."""
 NEAR_KPA = 2.0
 """A recorded level lies this near to its nominal pressure."""
 
@@ -50,7 +62,8 @@ class MuscleBands:
     def read(cls, muscle: str, run: Path) -> MuscleBands:
         """Read a RUN folder; ``predictions.csv``, which can reach further, goes before ``bands.csv``.
 
-        Raises ``InputError`` where it is no finished run, or a run without the friction that is wanted.
+        Raises ``InputError`` where it is no finished run, one of something else, or without the friction that
+        is wanted.
         """
         frames = []
         for name in ("predictions.csv", "bands.csv"):
@@ -58,6 +71,7 @@ class MuscleBands:
                 frames.append(pd.read_csv(run / name))
         if not frames or not (run / "summary.csv").is_file():
             raise InputError(run, "no summary.csv and bands.csv", "the RUN folder of a finished calibrate")
+        _demand_muscle(muscle, run / RUN_FILE)
         keys = ["quantity", "pressure_kPa", "contraction", "branch"]
         bands = pd.concat(frames).drop_duplicates(keys).sort_values(["quantity", "pressure_kPa"])
         summary = pd.read_csv(run / "summary.csv")
@@ -79,6 +93,27 @@ class MuscleBands:
         distance = (rows["pressure_kPa"] - P_kPa).abs()
         near: pd.DataFrame = rows[(distance <= NEAR_KPA) & (distance == distance.min())]
         return near.sort_values("contraction")
+
+
+def _demand_muscle(muscle: str, record: Path) -> None:
+    """Raise ``InputError`` where a run's record is not that of the thesis's muscle."""
+    try:
+        content = json.loads(record.read_text(encoding="utf-8"))
+        geometry = content["blueprint"]["geometry"]
+        levels, material = content["blueprint"]["levels"], str(content["specimen"]["bladder_material"])
+        own = {name: float(geometry[name]) for name in GEOMETRY} if geometry else {}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(record, "no readable record", "that of a finished calibrate") from error
+    name = MPAM1 if muscle == MPAM1_STRAND else muscle
+    if not own or not levels:
+        raise InputError(record, "a run of a material", f"one of the muscle {name}")
+    other = {k: v for k, v in own.items() if not np.isclose(v, GEOMETRY[k])}
+    if other:
+        found = "another muscle, " + ", ".join(f"{k} = {v:g}" for k, v in other.items())
+        expected = f"{name}'s " + ", ".join(f"{k} = {GEOMETRY[k]:g}" for k in other)
+        raise InputError(record, found, expected)
+    if material in MATERIALS.values() and material != MATERIALS[name]:
+        raise InputError(record, f"a bladder of {material}", f"{name}'s, of {MATERIALS[name]}")
 
 
 def _strand_draws(run: Path) -> Array | None:

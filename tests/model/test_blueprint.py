@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from mpam_calib.model.blueprint import Blueprint, MaterialPosterior, Options, draw_blueprint
 from mpam_calib.model.model import build_model
 from mpam_calib.specimen.declaration import Fit, Geometry, GeometrySd, Noise, Sensors
-from mpam_calib.specimen.recording import FreeContraction, Tensile
+from mpam_calib.specimen.recording import FreeContraction, Loops, Tensile
 
 from . import build
 
@@ -81,6 +81,45 @@ def test_where_pulling_begins_is_a_pressure_with_a_clear_pull():
     pulling = np.where(made.loops.level > 0, 30.0, 0.1)
     assert draw_blueprint(build.with_force(made, pulling)).pulls_at == pytest.approx(1e5)
     assert draw_blueprint(build.with_force(made, np.full(72, 30.0))).pulls_at == pytest.approx(5e4)
+
+
+def test_a_pull_without_pressure_or_beyond_the_rest_length_says_nothing():
+    """A bladder that is stretched pulls by itself, and so does one at 0 kPa."""
+    made = build.specimen({"law": "linear", "order": 3}, build.loops((0.0, 50.0, 100.0, 150.0)))
+    loops = made.loops
+    assert loops is not None
+    away = loops.displacement_m - loops.displacement_m.min() - 1e-3
+    made = replace(made, loops=replace(loops, displacement_m=away))
+    stretched = away < 0.0
+    assert set(loops.level[stretched]) == {0, 1, 2, 3}
+    pull = np.where(stretched | (loops.level == 0) | (loops.level > 1), 30.0, 0.1)
+    assert draw_blueprint(build.with_force(made, pull)).pulls_at == pytest.approx(1e5)
+
+
+def test_a_level_that_comes_back_is_held_anew():
+    """100, 200 and again 100 kPa, of 24 rows each: 2.3 s, not from the first to the last."""
+    recorded = build.loops((100.0, 200.0, 100.0))
+    assert np.array_equal(np.unique(recorded.level), [0, 1, 2])
+    recorded = replace(recorded, level=np.where(recorded.level == 2, 0, recorded.level))
+    drawn = draw_blueprint(build.with_force(build.specimen(None, recorded), np.full(72, 9.0)))
+    assert drawn.level_time == pytest.approx(2.3)
+
+
+def test_a_single_reading_has_a_time():
+    one = build.loops((100.0,), rows=1)
+    one = Loops(**{k: v[:1] if isinstance(v, np.ndarray) else v for k, v in vars(one).items()})
+    made = build.with_force(build.specimen(None, one), np.full(1, 9.0))
+    assert np.isfinite(draw_blueprint(made).reading_time)
+
+
+def test_a_free_contraction_far_from_all_levels_reaches_none():
+    recorded = build.loops((100.0, 200.0))
+    free = FreeContraction(np.array([2.005e5, 4e5]), np.array([0.25, 0.35]))
+    made = build.specimen(None, recorded, free_contraction=free)
+    reach = draw_blueprint(build.with_force(made, np.full(48, 9.0))).reach
+    assert reach == pytest.approx((0.2 * 11.5 / 12, 0.25))
+    alone = build.specimen(None, None, levels_kPa=(200.0, 390.0), free_contraction=free)
+    assert draw_blueprint(alone).reach == pytest.approx((0.25, 0.35))
 
 
 def test_stroke_reach_and_times():

@@ -17,7 +17,7 @@ from mpam_calib.prediction.simulate import simulate
 from mpam_calib.specimen import read
 
 from .command import Here, contents, stamps
-from .small import SIMULATION, Specimen, loops_text
+from .small import MODULI, SIMULATION, Specimen, loops_text, static_force
 
 UNITS = {"dead_band": "kPa", "braid_angle": "°", "length_offset": "mm"}
 
@@ -39,6 +39,46 @@ def test_a_size_that_a_rig_may_have_is_hidden_and_told(muscle: Path, tmp_path: P
     assert here("simulate", muscle, "-o", tmp_path / "made", "--hide", "dead_band=7.5").code == 0
     truth = json.loads((tmp_path / "made" / "truth.json").read_text())
     assert truth["hidden"]["dead_band"] == {"P_DB_kPa": 7.5}
+
+
+def test_the_truth_holds_all_that_was_put_in_under_the_summary_s_names(muscle: Path) -> None:
+    """The force of its moduli and friction is the one at the rows, but for noise."""
+    specimen = read(muscle)
+    made = simulate(specimen, {"dead_band": 7.5})
+    names = {"a_1", "a_2", "b_1", "b_2", "K_f", "noise_sd_N", "P_DB_kPa"}
+    assert names <= set(made.parameters)
+    assert not [name for name in made.parameters if "remainder" in name]
+    loops, put = made.specimen.loops, made.parameters
+    assert loops is not None
+    moduli = tuple((put[f"a_{k}"], put[f"b_{k}"]) for k in (1, 2))
+    pressure, contraction = loops.pressure_Pa / 1e3, loops.displacement_m / 0.05
+    # The law is one in the gauge's pressure; only the gas has 7.5 kPa less.
+    free = static_force(pressure, contraction, moduli)
+    none = ((0.0, 0.0), (0.0, 0.0))
+    free -= static_force(pressure, contraction, none) - static_force(pressure - 7.5, contraction, none)
+    force = free + put["K_f"] * np.abs(free) * loops.branch
+    noise = np.hypot(put["noise_sd_N"], put["noise_corr_sd_N"])
+    assert np.std(loops.force_N - force) == pytest.approx(noise, rel=0.15)
+
+
+def test_rates_of_a_law_are_told_as_the_summary_tells_them(tmp_path: Path) -> None:
+    simulation = SIMULATION.replace('"linear"', '"exponential"')
+    specimen = read(Specimen(simulation=simulation).write(tmp_path / "own", loops=loops_text(rows=40)))
+    put = simulate(specimen).parameters
+    assert {"c_1", "c_2", "w_1", "w_2", "d", "z"} <= set(put) and "gap" not in put
+    assert put["d"] > put["z"] and abs(put["z"]) < 1.0
+    factor = np.exp(put["d"] * 150.0), np.exp(put["z"] * 150.0)
+    stiff = put["c_1"] * factor[0] + put["w_1"] * factor[1]
+    assert stiff == pytest.approx(MODULI[0][0] * 150.0 + MODULI[0][1], rel=0.3)
+
+
+def test_declared_moduli_are_put_in_as_declared(tmp_path: Path) -> None:
+    tensile = 'moduli = "tensile"\nE_Pa = [4.0e4, 2.6e4]\nE_rel_sd = 0.1\n'
+    simulation = "[simulation]\n" + tensile + 'friction = "coulomb"\n'
+    specimen = read(Specimen(simulation=simulation).write(tmp_path / "own"), data_required=False)
+    put = simulate(specimen).parameters
+    assert (put["E_1"], put["E_2"]) == pytest.approx((4.0e4, 2.6e4))
+    assert put["K_f"] == pytest.approx(0.0787)
 
 
 def test_an_effect_may_be_hidden_in_another_form(muscle: Path, tmp_path: Path, here: Here) -> None:

@@ -129,6 +129,16 @@ def test_a_rigs_own_columns(tmp_path: Path) -> None:
     assert found.time_s == pytest.approx(recording.time)
 
 
+def test_one_column_of_the_rig_for_two_of_the_package(tmp_path: Path) -> None:
+    recording = loops()
+    declaration = DECLARATION + '[columns.loops]\npressure_kPa = "p"\nsetpoint_kPa = "p"\n'
+    text = recording.text("time_s,p,displacement_mm,force_N")
+    specimen = read(make(tmp_path, declaration, loops=text))
+    assert specimen.loops is not None
+    assert specimen.loops.pressure_Pa == pytest.approx(recording.pressure * 1e3)
+    assert specimen.levels_Pa == pytest.approx([50e3, 100e3, 150e3])
+
+
 NUMBERS = st.floats(-1e12, 1e12, allow_nan=False).filter(lambda value: value == 0 or abs(value) > 1e-12)
 
 

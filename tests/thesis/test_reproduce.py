@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
+from typing import Any
 
 import arviz as az
 import numpy as np
@@ -173,8 +176,24 @@ def test_material_is_the_bundled_curve() -> None:
     assert own == (DATASETS / "ecoflex_tension" / "tensile.csv").read_bytes()
 
 
+SIZES = {"L0_mm": 50.0, "R0_mm": 3.0, "t0_mm": 0.7, "alpha0_deg": 72.0}
+
+
+def write_record(
+    folder: Path,
+    geometry: dict[str, float] | None = SIZES,
+    material: str = "",
+    levels: tuple[float, ...] = (1e5,),
+) -> None:
+    """What a run says of itself, as far as the reproduction asks."""
+    blueprint = {"geometry": geometry, "levels": levels}
+    content = {"blueprint": blueprint, "specimen": {"name": "M", "bladder_material": material}}
+    (folder / "run.json").write_text(json.dumps(content))
+
+
 def run_folder(folder: Path) -> Path:
     """A RUN folder as calibrate and predict write it, small."""
+    write_record(folder)
     q = "quantity,pressure_kPa,contraction,branch,mean,q05,q25,q50,q75,q95,extrapolated"
     bands = [
         q,
@@ -211,9 +230,51 @@ def test_a_run_without_strand_friction_is_refused_where_it_is_wanted(tmp_path: P
         MuscleBands.read(MPAM1_STRAND, run_folder(tmp_path))
 
 
+@pytest.mark.parametrize(
+    ("record", "found"),
+    [
+        (
+            {"geometry": {**SIZES, "L0_mm": 120.0}},
+            "found another muscle, L0_mm = 120, expected MPAM1's L0_mm = 50",
+        ),
+        ({"geometry": {**SIZES, "alpha0_deg": 61.4}}, "found another muscle, alpha0_deg = 61.4"),
+        ({"geometry": None, "levels": ()}, "found a run of a material, expected one of the muscle MPAM1"),
+        ({"levels": ()}, "found a run of a material"),
+        ({"material": "PDMS + Ecoflex 00-30 (1:10)"}, "found a bladder of PDMS"),
+    ],
+)
+def test_a_run_of_something_else_is_refused(record: dict[str, Any], found: str, tmp_path: Path) -> None:
+    run = run_folder(tmp_path)
+    MuscleBands.read(MPAM1, run)
+    write_record(run, **record)
+    with pytest.raises(InputError, match=f"run.json: {re.escape(found)}"):
+        MuscleBands.read(MPAM1, run)
+
+
+@pytest.mark.parametrize("content", [None, "", "[]", '{"blueprint": {}}'])
+def test_a_run_that_does_not_say_what_it_is_of_is_refused(content: str | None, tmp_path: Path) -> None:
+    record = run_folder(tmp_path) / "run.json"
+    record.unlink()
+    if content is not None:
+        record.write_text(content)
+    with pytest.raises(InputError, match=r"run\.json: found no readable record"):
+        MuscleBands.read(MPAM1, tmp_path)
+
+
+def test_the_command_refuses_another_muscle_s_run_and_writes_nothing(tmp_path: Path) -> None:
+    for option in ("--mpam1", "--mpam2", "--mpam1-strand"):
+        run = strand_run(tmp_path / option)
+        write_record(run, {**SIZES, "R0_mm": 5.0})
+        out = tmp_path / "out"
+        result = CliRunner().invoke(app, ["reproduce", "-o", str(out), option, str(run)])
+        assert isinstance(result.exception, InputError) and "R0_mm = 5" in str(result.exception)
+        assert not out.exists()
+
+
 def strand_run(folder: Path, P_kPa: float = 99.6) -> Path:
     """A RUN folder with strand friction: one curve, draws of f_s."""
     folder.mkdir()
+    write_record(folder)
     rng = np.random.default_rng(2)
     draws = rng.normal(0.3, 0.02, (2, 200))
     az.from_dict(posterior={"f_s": draws}).to_netcdf(str(folder / "posterior.nc"), engine="h5netcdf")

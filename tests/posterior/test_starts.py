@@ -1,0 +1,40 @@
+"""Where walkers start: inside the posterior's support, or not at all."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+import pytest
+
+from mpam_calib.errors import InputError
+from mpam_calib.posterior.collapsed import Collapsed
+from mpam_calib.posterior.ensembles import start_states
+from mpam_calib.posterior.proposal import StudentMixture
+
+MIXTURE = StudentMixture.build([np.zeros(2)], [np.eye(2)])
+
+
+class Bounded:
+    """A density that is finite below a bound on the first coordinate; counts what it is asked."""
+
+    def __init__(self, bound: float) -> None:
+        self.bound, self.calls = bound, 0
+
+    def log_posterior(self, u: np.ndarray) -> np.ndarray:
+        self.calls += 1
+        assert self.calls <= 1000, "no end in sight"
+        return np.where(u[:, 0] < self.bound, -0.5 * np.sum(u**2, axis=1), -np.inf)
+
+
+def test_a_density_that_is_nowhere_finite_is_refused() -> None:
+    nowhere = Bounded(-np.inf)
+    with pytest.raises(InputError, match="found no finite probability near the best fit"):
+        start_states(cast(Collapsed, nowhere), MIXTURE, 8, [0])
+
+
+def test_starts_outside_are_drawn_again() -> None:
+    half = Bounded(0.0)
+    (state,) = start_states(cast(Collapsed, half), MIXTURE, 50, [0])
+    assert np.all(state.coords[:, 0] < 0.0)
+    assert np.all(np.isfinite(state.log_prob))

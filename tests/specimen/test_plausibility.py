@@ -1,0 +1,122 @@
+"""Values that are hardly meant: another unit, a code for no reading, strokes of too few rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpam_calib.errors import InputError
+from mpam_calib.specimen import read
+
+from .folders import DECLARATION, HEADER, Recording, loops, make
+
+LONG = DECLARATION.replace("L0_mm = 50.0", "L0_mm = 180.0")
+RUBBER = '[specimen]\nname = "rubber"\n[files]\ntensile = "t.csv"\n[simulation]\norder = 1\n'
+MAP = DECLARATION.replace('loops = "loops.csv"', 'force_map = "force_map.csv"')
+
+
+def table(columns: np.ndarray) -> str:
+    return "\n".join([HEADER, *(",".join(f"{value:.6g}" for value in row) for row in columns)]) + "\n"
+
+
+def refused(folder: Path) -> str:
+    with pytest.raises(InputError) as error:
+        read(folder)
+    said = str(error.value).removeprefix(f"{folder}/")
+    assert "\n" not in said
+    return said
+
+
+@pytest.mark.parametrize(
+    ("largest", "said", "scale"),
+    [(0.361, "(a share of L0?)", "scale = 180.0"), (0.065, "(metres?)", "scale = 1000.0")],
+)
+def test_a_displacement_as_a_share_is_told_from_metres(
+    largest: float, said: str, scale: str, tmp_path: Path
+) -> None:
+    """A thousand times what is given must be shorter than the muscle, or it is not in metres."""
+    columns = loops().columns()
+    columns[:, 2] *= largest / columns[:, 2].max()
+    message = refused(make(tmp_path, LONG, loops=table(columns)))
+    assert message.startswith("loops.csv:displacement_mm: found a largest displacement of ")
+    assert said in message and scale in message
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("1.15", ("found 1.15, a braid that lengthens under pressure (radians?)", "(65.9?)")),
+        ("18.0", ("(the angle from the axis?)", "(72?)")),
+    ],
+)
+def test_a_braid_angle_in_radians_is_told_from_one_from_the_axis(
+    given: str, said: tuple[str, str], tmp_path: Path
+) -> None:
+    declaration = DECLARATION.replace("72.0", given)
+    message = refused(make(tmp_path, declaration, loops=loops().text()))
+    assert all(part in message for part in said)
+
+
+@pytest.mark.parametrize("rows", [2, 3])
+def test_strokes_of_too_few_rows_are_not_said_to_rest(rows: int, tmp_path: Path) -> None:
+    way = np.linspace(0.0, 17.5, rows)
+    x = np.tile(np.concatenate([way, way[::-1]]), 12)
+    pressure = np.repeat([50.0, 100.0, 150.0], len(x) // 3)
+    columns = np.stack([0.1 * np.arange(len(x)), pressure, x, 0.3 * pressure - x], axis=1)
+    message = refused(make(tmp_path, loops=table(columns)))
+    assert f"found {24 * rows} rows for 24 strokes" in message
+    assert "expected at least 4 rows a stroke" in message
+    assert "never moves" not in message
+
+
+def test_a_held_crosshead_whose_encoder_rustles_never_moves(tmp_path: Path) -> None:
+    made = loops()
+    rest = 5.0 + 0.001 * np.random.default_rng(0).standard_normal(len(made.time))
+    held = Recording(made.time, made.pressure, rest, made.force, made.branch, made.cycle)
+    message = refused(make(tmp_path, loops=held.text()))
+    assert "found a displacement that never moves (4.99" in message
+    assert "no more than it scatters" in message
+
+
+@pytest.mark.parametrize(
+    ("column", "name", "code"),
+    [(3, "force_N", 9.9e37), (1, "pressure_kPa", 9.9e37), (2, "displacement_mm", -1e6)],
+)
+def test_a_code_for_no_reading_is_refused_where_it_stands(
+    column: int, name: str, code: float, tmp_path: Path
+) -> None:
+    columns = loops().columns()
+    columns[20, column] = code
+    message = refused(make(tmp_path, loops=table(columns)))
+    assert message.startswith(f"loops.csv:22:{name}: found {code:g} (a code for no reading?)")
+
+
+def test_such_a_code_in_a_force_map_and_a_tensile_test(tmp_path: Path) -> None:
+    rows = "".join(f"{P},{g},{P / 5}\n" for P in (50, 100) for g in (0.0, 0.05, 0.1))
+    text = f"pressure_kPa,contraction,force_N\n{rows}100,0.12,9.9e37\n"
+    message = refused(make(tmp_path / "map", MAP, force_map=text))
+    assert message.startswith("force_map.csv:8:force_N: found 9.9e+37 (a code for no reading?)")
+    text = "strain,stress_Pa\n0.1,4000\n0.2,9.9e37\n0.3,12000\n"
+    message = refused(make(tmp_path / "rubber", RUBBER, t=text))
+    assert message.startswith("t.csv:3:stress_Pa: found 9.9e+37 (a code for no reading?)")
+
+
+@pytest.mark.parametrize(
+    ("strains", "said"),
+    [
+        ((0.2, 0.2, 0.2), "t.csv:strain: found a strain of 0.2 throughout, expected a range of strains"),
+        ((-0.1, -0.2, -0.3), "t.csv:strain: found a median strain of -0.2 (flipped sign?), expected "),
+    ],
+)
+def test_strains_that_tell_nothing_are_refused(strains: tuple[float, ...], said: str, tmp_path: Path) -> None:
+    rows = "".join(f"{strain},{4000 + i}\n" for i, strain in enumerate(strains))
+    assert refused(make(tmp_path, RUBBER, t=f"strain,stress_Pa\n{rows}")).startswith(said)
+
+
+def test_a_nul_in_a_file_s_name_is_refused(tmp_path: Path) -> None:
+    declaration = DECLARATION.replace('"loops.csv"', '"lo\\u0000ops.csv"')
+    message = refused(make(tmp_path, declaration, loops=loops().text()))
+    assert message.startswith("specimen.toml:11:files.loops: found ")
+    assert message.endswith("expected a file's name")

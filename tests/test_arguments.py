@@ -1,0 +1,66 @@
+"""Options of the public functions that mean nothing are told as the command line tells them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mpam_calib as mc
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="module")
+def rubber() -> mc.Specimen:
+    return mc.read(ROOT / "datasets" / "ecoflex_tension")
+
+
+CALIBRATE = {
+    "a seed below 0": ({"seed": -1}, "--seed: found -1, expected a whole number from 0 upwards"),
+    "a seed that is a fraction": ({"seed": 1.5}, "--seed: found 1.5, expected a whole number"),
+    "a seed in words": ({"seed": "one"}, "--seed: found str 'one', expected a whole number"),
+    "no steps": ({"max_steps": 0}, "--max-steps: found 0, expected a whole number from 1 upwards"),
+    "no draws": ({"ess_wanted": 0.0}, "--ess: found 0.0, expected a number from 1 upwards"),
+    "draws without end": ({"ess_wanted": float("inf")}, "--ess: found inf, expected a number"),
+    "not a number of draws": ({"ess_wanted": float("nan")}, "--ess: found nan, expected a number"),
+}
+
+
+@pytest.mark.parametrize("name", CALIBRATE)
+def test_an_option_of_calibrate_that_means_nothing(name: str, rubber: mc.Specimen) -> None:
+    options, said = CALIBRATE[name]
+    with pytest.raises(mc.InputError) as error:
+        mc.calibrate(rubber, **options)  # type: ignore[arg-type]
+    assert str(error.value).startswith(said)
+
+
+@pytest.mark.parametrize("function", [mc.calibrate, mc.simulate])
+@pytest.mark.parametrize("given", ["datasets/ecoflex_tension", Path("datasets/ecoflex_tension"), None])
+def test_what_is_no_specimen(given: object, function: Callable[[object], object]) -> None:
+    with pytest.raises(mc.InputError, match=r"SPECIMEN: found .*, expected a Specimen, as mpam_calib\.read"):
+        function(given)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"seed": -1}, "--seed: found -1, expected a whole number from 0 upwards"),
+        ({"hide": {"dead_band": "abc"}}, "--hide: found dead_band='abc', expected effect ids with sizes"),
+        ({"hide": {1: 2.0}}, "--hide: found 1=2.0, expected effect ids with sizes"),
+        ({"hide": ["dead_band"]}, "--hide: found list ['dead_band'], expected effect ids with sizes"),
+    ],
+)
+def test_an_option_of_simulate_that_means_nothing(
+    options: dict[str, object], said: str, rubber: mc.Specimen
+) -> None:
+    with pytest.raises(mc.InputError) as error:
+        mc.simulate(rubber, **options)  # type: ignore[arg-type]
+    assert str(error.value).startswith(said)
+
+
+def test_numpy_s_numbers_are_numbers(rubber: mc.Specimen) -> None:
+    found = mc.calibrate(rubber, seed=np.int64(3), max_steps=np.int32(40), ess_wanted=np.float64(50.0))
+    assert found.seed == 3
