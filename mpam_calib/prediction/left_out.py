@@ -31,10 +31,11 @@ from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import KPA
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 COLUMNS = ["pressure_kPa", "readings", "rmse_N", "bias_N", "bias_sd_N", "inside90", "extrapolated"]
 FEWEST, MOST = 3, 8
-"""Levels from which one can be left out, and how many are."""
+"""Levels from which one can be left out, and of a test with loops, which cost the most, how many are."""
 READINGS = 200
 """Readings of a level that are predicted."""
 DRAWS, PROPOSED = 400, 2000
@@ -58,13 +59,24 @@ def levels_left_out(specimen: Specimen, target: Collapsed, draws: Draws, seed: i
     there; ``bias_N`` their mean above the prediction, ``bias_sd_N`` the sd that the prediction gives it, one
     reading's noise left out. Empty where there are fewer than FEWEST levels, or moduli of each level's own.
     """
+    return pd.DataFrame(_rows(specimen, target, draws, seed), columns=COLUMNS)
+
+
+def levels_looked_at(specimen: Specimen) -> Ints:
+    """All levels where that is cheap; of a test with loops, whose rows are many, at most MOST of them."""
+    count = len(specimen.levels_Pa)
+    most = count if specimen.loops is None else MOST
+    return np.unique(np.linspace(0, count - 1, most).round().astype(np.int64))
+
+
+def _rows(specimen: Specimen, target: Collapsed, draws: Draws, seed: int) -> list[list[object]]:
     levels = specimen.levels_Pa
     if target.model.setting is None or len(levels) < FEWEST or specimen.simulation.law == "free":
-        return pd.DataFrame(columns=COLUMNS)
+        return []
     thinned = draws.thin(DRAWS)
     whole = _likelihood(target, thinned)
-    rows = []
-    for level in np.unique(np.linspace(0, len(levels) - 1, MOST).round().astype(np.int64)):
+    rows: list[list[object]] = []
+    for level in levels_looked_at(specimen):
         held = _held(specimen, target, int(level))
         if held is None:
             continue
@@ -84,7 +96,7 @@ def levels_left_out(specimen: Specimen, target: Collapsed, draws: Draws, seed: i
                 bool(level in (0, len(levels) - 1)),
             ]
         )  # fmt: skip
-    return pd.DataFrame(rows, columns=COLUMNS)
+    return rows
 
 
 def _held(specimen: Specimen, target: Collapsed, level: int) -> _Held | None:

@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from mpam_calib.report import wording
 from mpam_calib.report.figures import corner, loops, pressure, priors, residuals
+from mpam_calib.report.held import held_between
 from mpam_calib.report.numbers import decimals, fixed, significant, with_band
 from mpam_calib.report.page import (
     Block,
@@ -24,7 +25,7 @@ from mpam_calib.report.page import (
 )
 from mpam_calib.report.parameters import RIGHT, learnt_table, summary_table
 from mpam_calib.report.spoken import spoken
-from mpam_calib.report.trust import assess, held_between
+from mpam_calib.report.trust import assess
 from mpam_calib.report.view import CalibrationView
 
 LONG_TABLE = 12
@@ -82,7 +83,7 @@ def _fit_cards(view: CalibrationView) -> list[KeyNumber]:
 
 
 def _band(row: pd.Series, scale: float = 1.0) -> tuple[str, str]:
-    return with_band(scale * float(row["mean"]), scale * float(row["q05"]), scale * float(row["q95"]))
+    return with_band(*(scale * float(row[q]) for q in ("mean", "q05", "q95", "q50")))
 
 
 def _sections(view: CalibrationView) -> list[Section]:
@@ -167,8 +168,10 @@ def _left_out_section(view: CalibrationView) -> Section:
         for row in view.left_out.to_dict("records")
     ]
     table = pd.DataFrame(rows)
+    some = len(rows) < len(view.levels_kPa)
     caption = (
         "Readings of a level that the fit has not seen; ±: one sigma that the prediction gives its own mean"
+        + (f". {len(rows)} of {len(view.levels_kPa)} levels are looked at" if some else "")
     )
     return Section(
         "Each level predicted from the others",

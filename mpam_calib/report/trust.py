@@ -10,10 +10,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
 from mpam_calib.posterior.convergence import ESS_WANTED, RHAT_LIMIT
 from mpam_calib.report.blocks import Level, Verdict
+from mpam_calib.report.doubts import Z90, look_first, overruled_slack, wandering
+from mpam_calib.report.held import (
+    along_stroke,
+    between_levels,
+    beyond_levels,
+    full_length,
+    held_along,
+    held_between,
+    held_near,
+)
+from mpam_calib.report.limit import Limit
+from mpam_calib.report.noise_size import noise_known, noise_size
 from mpam_calib.report.numbers import significant
 from mpam_calib.report.view import CalibrationView
 
@@ -24,34 +34,13 @@ REMAINDER_BAD: Final = 0.10
 WIDE_CAUTION: Final = 0.10
 WIDE_BAD: Final = 0.30
 """Half of the 90 % band over the value."""
-HELD: Final = 0.80
-"""Least share of a level's readings, predicted from other levels, in bands that should hold 90 % ..."""
-HELD_READINGS: Final = 20
-"""... where there are so many; of fewer a fifth may lie outside by chance."""
-NEAR: Final = 0.02
-"""Contraction up to which readings lie near full length, where the blocked force is read."""
 UNIDENTIFIED: Final = 0.20
 """A posterior that is narrower than its prior by less than this share learnt nothing."""
 GAUGE_SHARE: Final = 0.5
 """The gauge limits the result when it makes up this share of the band ..."""
 GAUGE_TAKEN_UP: Final = 2.0
 """... and where it would make up this many of the band, free parameters have taken up its offset."""
-Z90: Final = 1.6449
-"""sigmas in half a central 90 % interval"""
-
 _RANK: dict[Level, int] = {"good": 0, "caution": 1, "bad": 2}
-
-
-@dataclass(frozen=True)
-class Limit:
-    """Something that limits the numbers: how badly, in a full sentence, and in a few words.
-
-    A limit of level "good" is a remark: worth knowing, but the numbers with their bands stand.
-    """
-
-    level: Level
-    sentence: str
-    brief: str
 
 
 def convergence(view: CalibrationView) -> Limit | None:
@@ -93,22 +82,7 @@ def remainder(view: CalibrationView) -> Limit | None:
         "The bands include this. The command diagnose looks for the cause."
     )
     level: Level = "good" if share <= REMAINDER_CAUTION else "caution" if share <= REMAINDER_BAD else "bad"
-    asked = [words for words in view.warnings if words.endswith("?") or "far from" in words]
-    if level == "bad" and asked:
-        sentence += f" But look at the data first: {'; '.join(asked[:3])}"
     return Limit(level, sentence, f"the simulation is wrong by about {size}")
-
-
-def full_length(view: CalibrationView) -> Limit | None:
-    """Readings near full length miss their bands: so does the blocked force."""
-    share = held_near(view)
-    if share is None or share >= HELD:
-        return None
-    sentence = (
-        f"Do not take the blocked force at its band: near full length {100 * share:.0f} % of the readings "
-        "lie in bands that should hold 90 % of them. The command diagnose looks for the cause."
-    )
-    return Limit("caution", sentence, "near full length the bands miss their readings")
 
 
 def band_width(view: CalibrationView) -> Limit | None:
@@ -144,30 +118,6 @@ def extrapolation(view: CalibrationView) -> Limit | None:
     )
     verb = "is" if len(names) == 1 else "are"
     return Limit("caution", sentence, f"the {' and the '.join(names)} {verb} extrapolated")
-
-
-def between_levels(view: CalibrationView) -> Limit | None:
-    """The inner levels, predicted from the others, miss their readings: so it is anywhere between levels."""
-    share = held_between(view)
-    if share is None or share >= HELD:
-        return None
-    sentence = (
-        "Use these numbers at the recorded pressures only: a level between others, predicted from them, has "
-        f"{100 * share:.0f} % of its readings inside bands that should hold 90 % of them."
-    )
-    return Limit("caution", sentence, "between the recorded pressures the bands are too narrow")
-
-
-def beyond_levels(view: CalibrationView) -> Limit | None:
-    """The outer levels, predicted from the others, miss their readings."""
-    share = _held(view, extrapolated=True)
-    if share is None or share >= HELD:
-        return None
-    sentence = (
-        "Do not extrapolate in pressure: the lowest and the highest level, predicted from the others, have "
-        f"{100 * share:.0f} % of their readings inside bands that should hold 90 % of them."
-    )
-    return Limit("good", sentence, "beyond the recorded pressures the bands are too narrow")
 
 
 def gauge(view: CalibrationView) -> Limit | None:
@@ -233,23 +183,32 @@ class Check:
     possible: Callable[[CalibrationView], bool] = _always
 
 
+# To lie within noise that holds what the simulation misses is no good news.
 CHECKS: tuple[Check, ...] = (
     Check(convergence, "the sampler has settled"),
     Check(
+        along_stroke,
+        "the readings lie in their bands",
+        lambda view: held_along(view) is not None and noise_size(view) is None,
+    ),
+    Check(
         between_levels,
         "the inner levels lie in the bands that the others give",
-        lambda view: held_between(view) is not None,
+        lambda view: held_between(view) is not None and noise_size(view) is None,
     ),
     Check(beyond_levels),
+    Check(wandering),
+    Check(noise_size, "the noise is that of the load cell", noise_known),
     Check(
         remainder,
         "the simulation fits to within the noise or half a per cent",
-        lambda view: math.isfinite(view.remainder) and math.isfinite(view.noise),
+        lambda view: math.isfinite(view.remainder) and math.isfinite(view.noise) and noise_size(view) is None,
     ),
+    Check(overruled_slack),
     Check(
         full_length,
         "the readings near full length lie in their bands",
-        lambda view: held_near(view) is not None,
+        lambda view: held_near(view) is not None and noise_size(view) is None,
     ),
     Check(band_width, f"the bands are within ± {100 * WIDE_CAUTION:.0f} %"),
     Check(extrapolation, "nothing is extrapolated", lambda view: not view.tensile),
@@ -275,6 +234,8 @@ def assess(view: CalibrationView) -> Verdict:
     limits.sort(key=lambda limit: -_RANK[limit.level])
     level: Level = limits[0].level if limits else "good"
     reasons = [limit.sentence for limit in limits]
+    if asked := look_first(view, level):
+        reasons.insert(1, asked)
     if in_order:
         reasons.append(f"In order: {'; '.join(in_order)}.")
     return Verdict(_sentence(level, limits), level, reasons)
@@ -304,35 +265,6 @@ def headline_bands(view: CalibrationView) -> list[tuple[str, float, float, float
             if row is not None:
                 chosen.append((words, row))
     return [(words, float(row["mean"]), float(row["q05"]), float(row["q95"])) for words, row in chosen]
-
-
-def held_between(view: CalibrationView) -> float | None:
-    """Share of the inner levels' readings in the 90 % bands that the others give; None where they are few."""
-    return _held(view, extrapolated=False)
-
-
-def _held(view: CalibrationView, extrapolated: bool) -> float | None:
-    rows = view.left_out
-    if rows.empty:
-        return None
-    rows = rows[rows["extrapolated"].astype(bool) == extrapolated]
-    return float(rows["inside90"].mean()) if rows["readings"].sum() >= HELD_READINGS else None
-
-
-def held_near(view: CalibrationView) -> float | None:
-    """Share of the readings near full length in the 90 % bands of new ones; None where they are few."""
-    rows = view.readings("loops", "force_map")
-    rows = rows[(rows["contraction"] <= NEAR) & ~rows["censored"].astype(bool)]
-    bands = view.quantity("force_N_observed")
-    if len(rows) < HELD_READINGS or bands.empty:
-        return None
-    inside = []
-    for (level, branch), here in rows.groupby(["level_kPa", "branch"]):
-        band = bands[(bands["pressure_kPa"] == level) & (bands["branch"] == (branch or "mean"))]
-        if not band.empty:
-            low, high = (np.interp(here["contraction"], band["contraction"], band[q]) for q in ("q05", "q95"))
-            inside.append((here["force_N"] >= low) & (here["force_N"] <= high))
-    return float(np.mean(np.concatenate(inside))) if inside else None
 
 
 def unidentified_names(view: CalibrationView) -> list[str]:

@@ -73,9 +73,12 @@ class CalibrationView:
     ``headline`` (at most eight are shown), ``meanings`` what each parameter is, in a few words.
     ``remainder`` is the root mean square of what the
     simulation leaves out and ``noise`` one sigma of the sensor, both in N (Pa for a tensile test);
-    nan where not assessed. ``unidentified`` has ``parameter, prior_sd, posterior_sd, contraction``
-    (1 − posterior sd / prior sd) ``, sentence``. ``left_out`` has a row for each level that was predicted
-    from the others: ``pressure_kPa, readings, rmse_N, bias_N, bias_sd_N, inside90, extrapolated``.
+    nan where not assessed; ``reading_noise`` (N) is what readings scatter by from one to the next,
+    ``declared_noise`` the declared ``force_sd_N``; ``strays_kPa`` how far readings of each level's pressure
+    stray from it, shape (levels,), empty without loops. ``unidentified`` has ``parameter, prior_sd,
+    posterior_sd, contraction`` (1 − 90 % band of the posterior over that of the prior) ``, sentence``.
+    ``left_out`` has a row for each level that was predicted from the others: ``pressure_kPa, readings,
+    rmse_N, bias_N, bias_sd_N, inside90, extrapolated``.
 
     ``strain_range`` (tensile) has one row per range and quantity: ``strain_low, strain_high, used,
     quantity, unit, mean, q05, q95``, where a quantity is a modulus or a prediction. ``provenance``
@@ -103,6 +106,9 @@ class CalibrationView:
     provenance: str = ""
     remainder: float = float("nan")
     noise: float = float("nan")
+    reading_noise: float = float("nan")
+    declared_noise: float = float("nan")
+    strays_kPa: Sequence[float] = ()
     pressure_bias_sd_kPa: float = 0.0
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -23,7 +24,9 @@ from mpam_calib.prediction.left_out import levels_left_out
 from mpam_calib.prediction.strain_range import strain_range_table
 from mpam_calib.report.view import OBSERVED_COLUMNS, CalibrationView, Convergence
 from mpam_calib.run.folder import versions
-from mpam_calib.specimen.oddities import oddities
+from mpam_calib.specimen.oddities import level_stray, oddities
+from mpam_calib.specimen.recording import Loops
+from mpam_calib.specimen.summary import reading_noise
 from mpam_calib.units import KPA
 
 Array = NDArray[np.float64]
@@ -88,12 +91,19 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
         provenance=_provenance(calibration),
         remainder=remainder,
         noise=noise,
+        reading_noise=math.nan if specimen.loops is None else reading_noise(specimen.loops),
+        declared_noise=specimen.sensors.force_sd_N or math.nan,
+        strays_kPa=() if specimen.loops is None else _strays_kPa(specimen.loops, specimen.levels_Pa),
         pressure_bias_sd_kPa=specimen.sensors.pressure_bias_sd_kPa,
     )
 
 
 def _in_kpa(levels: Array) -> Array:
     return np.round(levels / KPA, 3)
+
+
+def _strays_kPa(loops: Loops, levels_Pa: Array) -> tuple[float, ...]:
+    return tuple(level_stray(loops, levels_Pa, index) / KPA for index in range(len(levels_Pa)))
 
 
 def _provenance(calibration: Calibration) -> str:

@@ -95,6 +95,19 @@ def _odd_speeds(loops: Loops) -> list[str]:
     return remarks
 
 
+def level_stray(loops: Loops, levels_Pa: Floats, index: int) -> float:
+    """How far (Pa) the readings of a level's pressure stray from it, all but one in a hundred; 0 without any.
+
+    Where it is changed on purpose it does not stray.
+    """
+    steady = _steady(loops, index)
+    return float(np.quantile(np.abs(steady - levels_Pa[index]), 0.99)) if len(steady) else 0.0
+
+
+def _steady(loops: Loops, index: int) -> Floats:
+    return np.asarray(loops.pressure_Pa[(loops.level == index) & (np.abs(loops.branch) != 2)])
+
+
 def _odd_levels(loops: Loops, levels_Pa: Floats) -> list[str]:
     remarks = []
     for index in np.unique(loops.level):
@@ -103,10 +116,9 @@ def _odd_levels(loops: Loops, levels_Pa: Floats) -> list[str]:
         present = [int(code) for code in np.unique(loops.branch[rows]) if code != 0]
         if len(present) == 1:
             remarks.append(f"{name} has only the branch {BRANCH_NAMES[present[0]]}")
-        held = np.abs(loops.branch[rows]) == 2
-        steady = loops.pressure_Pa[rows][~held]
+        steady = _steady(loops, index)
         if len(steady):
-            stray = float(np.quantile(np.abs(steady - levels_Pa[index]), 0.99))
+            stray = level_stray(loops, levels_Pa, index)
             if stray > WANDER_SHARE * abs(levels_Pa[index]):
                 remarks.append(f"{name} wanders by {stray / KPA:.3g} kPa")
             blips = np.abs(steady - levels_Pa[index]) > max(FAR_LEVEL * levels_Pa.max(), 2.0 * stray)

@@ -13,7 +13,8 @@ from mpam_calib.units import KPA, MINUTE, MM
 
 SPEED_SHARE = 0.1
 """Speeds closer than this are one speed."""
-
+EQUAL = 1e-9
+"""Forces that differ by less than this share of the largest are equal."""
 BRANCH_NAMES = {code: word or "none" for word, code in BRANCH_WORDS.items()}
 """What a branch code is called."""
 
@@ -110,6 +111,13 @@ def sampling_rates(loops: Loops) -> tuple[float, ...]:
 def force_noise(loops: Loops) -> float:
     """White noise of one force reading, N, by strokes."""
     return noise_within(loops.force_N, loops.stroke) * math.sqrt(loops.averaged)
+
+
+def reading_noise(loops: Loops) -> float:
+    """:func:`force_noise`, or what the steps of the display make, where that is more; nan where unknown."""
+    steps = np.diff(np.unique(loops.force_N))
+    steps = steps[steps > EQUAL * np.abs(loops.force_N).max()]
+    return max(force_noise(loops), float(steps.min()) / math.sqrt(12.0)) if len(steps) else math.nan
 
 
 def noise_within(values: Floats, group: Ints) -> float:

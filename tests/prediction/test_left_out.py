@@ -7,13 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from model import build
+from rig.muscle import static_force
 
 from mpam_calib.calibration import Calibration, calibrate
 from mpam_calib.model.blueprint import Options
 from mpam_calib.posterior.target import predict_force
-from mpam_calib.prediction.left_out import COLUMNS, levels_left_out
+from mpam_calib.prediction.left_out import (
+    COLUMNS,
+    levels_left_out,
+    levels_looked_at,
+)
 from mpam_calib.specimen.declaration import Sensors
-from mpam_calib.specimen.recording import Specimen
+from mpam_calib.specimen.recording import ForceMap, Specimen
 
 from .coverage import as_specimen, posterior_draws, rig_case
 
@@ -102,6 +107,26 @@ def test_readings_that_noise_lifts_above_a_floor_are_foreseen_by_nobody(sound):
     pulls = told(sound)
     assert (table["rmse_N"] < 1.5 * pulls["rmse_N"].max()).all()
     assert abs(table["inside90"].mean() - 0.90) < 0.06
+
+
+def test_of_a_map_every_level_is_left_out_and_of_loops_eight(sound):
+    muscle = rig_case(0)[0]
+    levels, places = np.linspace(0.4, 1.0, 10) * sound.specimen.levels_Pa[-1], np.linspace(0.0, 0.15, 5)
+    pressure, contraction = (grid.ravel() for grid in np.meshgrid(levels, places, indexing="ij"))
+    noise = 0.1 * np.random.default_rng(3).standard_normal(len(pressure))
+    grid = ForceMap(
+        pressure, contraction, static_force(muscle, pressure / 1e3, contraction) + noise,
+        np.repeat(np.arange(10), 5), np.zeros(50, dtype=np.int64), np.zeros(50, dtype=bool),
+    )  # fmt: skip
+    still = sound.specimen.simulation.model_copy(update={"friction": "none"})
+    specimen = replace(sound.specimen, loops=None, force_map=grid, levels_Pa=levels, simulation=still)
+    table = told(calibrate(specimen))
+    assert len(table) == 10
+    assert table["extrapolated"].sum() == 2
+
+    assert levels_looked_at(specimen).tolist() == list(range(10))
+    looped = replace(sound.specimen, levels_Pa=levels)
+    assert len(levels_looked_at(looped)) == 8 and levels_looked_at(looped)[[0, -1]].tolist() == [0, 9]
 
 
 def test_nothing_to_leave_out(sound):

@@ -164,6 +164,9 @@ def test_levels_predicted_from_the_others(view: CalibrationView) -> None:
         words = words_of(calibration_page(shown).render())
         assert heading in words and "Each level predicted from the others" in words
         assert "86 %" in words and "50 (beyond the others)" in words and "1.5 ± 0.2" in words
+        assert "2 of 5 levels are looked at" in words
+    every = replace(view, left_out=pd.concat([left_out] * 3)[:5])
+    assert "levels are looked at" not in words_of(calibration_page(every).render())
 
 
 def test_constant_and_broken_draws_do_not_stop_the_page(view: CalibrationView) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pandas as pd
 import pytest
 
@@ -89,33 +88,25 @@ def test_remainder(sound: CalibrationView, remainder: float, noise: float, level
         assert f"wrong by about {significant(remainder, 2)} N" in limit.sentence
 
 
-def test_a_bad_fit_asks_what_the_reader_asked(sound: CalibrationView) -> None:
-    """Units that are odd stand on the first screen; readings that were left out are no reason."""
-    odd = "loops: forces up to 9 N, while the gas alone pulls about 90 N; are the units right?"
+def test_the_fit_to_within_the_noise_is_no_praise_where_the_misfit_is_in_it(sound: CalibrationView) -> None:
+    praise = ("fits to within the noise", "readings lie in their bands", "inner levels lie")
+    left_out = pd.DataFrame({"inside90": 0.9, "readings": 200, "extrapolated": [True, False, True]})
+    reasons = trust.assess(replace(sound, left_out=left_out)).reasons
+    assert all(told in reasons[-1] for told in praise)
+    summary = sound.summary.copy()
+    summary.loc[summary["parameter"] == "noise_sd_N", "mean"] = 30.0
+    verdict = trust.assess(replace(sound, summary=summary, left_out=left_out, reading_noise=0.25))
+    assert verdict.level == "bad"
+    assert "30 N against 0.25 N from reading to reading" in verdict.sentence
+    assert not any(told in reason for told in praise for reason in verdict.reasons)
+
+
+def test_whatever_is_doubted_in_the_data_stands_behind_the_worst_reason(sound: CalibrationView) -> None:
+    odd = "loops: a force is far from all others (1e+05 N at 3 s)"
     warned = replace(sound, warnings=["loops: 4 readings at turns are left out", odd])
-    assert trust.remainder(replace(warned, remainder=3.0)).sentence.find("data first") < 0
-    sentence = trust.remainder(replace(warned, remainder=30.0)).sentence
-    assert sentence.endswith(f"look at the data first: {odd}")
-
-
-@pytest.mark.parametrize(("shift", "told"), [(0.0, False), (1.0, False), (3.0, True)])
-def test_readings_near_full_length(sound: CalibrationView, shift: float, told: bool) -> None:
-    """Readings that are off, by so many sds of their bands, where the blocked force is read."""
-    observed = sound.observed.copy()
-    sd = 0.5 + 0.004 * observed["pressure_kPa"]
-    observed["force_N"] += shift * sd * np.exp(-((observed["contraction"] / 0.02) ** 4))
-    limit = trust.full_length(replace(sound, observed=observed))
-    assert (limit is not None) == told
-    if limit is not None:
-        assert limit.level == "caution"
-        assert "near full length" in limit.sentence
-
-
-def test_few_readings_near_full_length_say_nothing(sound: CalibrationView) -> None:
-    observed = sound.observed[sound.observed["contraction"] > trust.NEAR]
-    verdict = trust.assess(replace(sound, observed=observed))
-    assert trust.held_near(replace(sound, observed=observed)) is None
-    assert not any("full length" in reason for reason in verdict.reasons)
+    assert not any(odd in reason for reason in trust.assess(warned).reasons)
+    for doubtful in (replace(warned, provenance="reconstructed"), settled(warned, converged=False)):
+        assert trust.assess(doubtful).reasons[1] == f"Look at the data first: {odd}"
 
 
 def test_an_unassessed_remainder_is_no_good_news(sound: CalibrationView) -> None:
@@ -145,40 +136,6 @@ def test_extrapolation_at_the_top_level_only(sound: CalibrationView) -> None:
     assert limit is not None
     assert limit.level == "caution"
     assert "free contraction at 250 kPa" in limit.sentence
-
-
-def left_out_levels(inside: tuple[float, ...], readings: int = 200) -> pd.DataFrame:
-    outer = [True, *[False] * (len(inside) - 2), True]
-    return pd.DataFrame({"inside90": inside, "readings": readings, "extrapolated": outer})
-
-
-@pytest.mark.parametrize(
-    ("inside", "between", "beyond"),
-    [
-        ((0.9, 0.9, 0.9, 0.9), None, None),
-        ((0.2, 0.9, 0.9, 0.9), None, "good"),
-        ((0.9, 0.9, 0.5, 0.9), "caution", None),
-        ((0.0, 0.1, 0.0, 0.1), "caution", "good"),
-    ],
-)
-def test_levels_that_the_others_do_not_foresee(
-    sound: CalibrationView, inside: tuple[float, ...], between: str | None, beyond: str | None
-) -> None:
-    left_out = left_out_levels(inside)
-    view = replace(sound, left_out=left_out)
-    limits = (trust.between_levels(view), trust.beyond_levels(view))
-    assert tuple(limit.level if limit else None for limit in limits) == (between, beyond)
-    if limits[0]:
-        assert f"{100 * (inside[1] + inside[2]) / 2:.0f} % of its readings" in limits[0].sentence
-
-
-def test_levels_that_could_not_be_left_out_are_no_good_news(sound: CalibrationView) -> None:
-    told = ("inner levels lie", "recorded pressures")
-    assert not any(words in reason for reason in trust.assess(sound).reasons for words in told)
-    reasons = trust.assess(replace(sound, left_out=left_out_levels((0.9, 0.9, 0.9)))).reasons
-    few = trust.assess(replace(sound, left_out=left_out_levels((0.5, 0.5, 0.5), readings=9)))
-    assert few.reasons == trust.assess(sound).reasons
-    assert "the inner levels lie in the bands that the others give" in reasons[-1]
 
 
 def test_a_gauge_that_makes_up_the_band_is_named(sound: CalibrationView) -> None:

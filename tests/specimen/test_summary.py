@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mpam_calib.specimen import read
-from mpam_calib.specimen.summary import summarise_loops
+from mpam_calib.specimen.summary import force_noise, reading_noise, summarise_loops
 
-from .folders import DECLARATION, HEADER, make
+from .folders import DECLARATION, HEADER, loops, make
 
 RATE, LEVEL, TOP_MM, STROKES = 10.0, 100.0, 10.0, 8
 
@@ -28,3 +29,13 @@ def test_a_speed_is_listed_however_few_readings_a_stroke_has(tmp_path: Path, row
     assert specimen.loops is not None and specimen.geometry is not None
     (level,) = summarise_loops(specimen.loops, specimen.levels_Pa, specimen.geometry.L0).levels
     assert level.speeds_mm_per_min == pytest.approx((TOP_MM * RATE / rows * 60.0,), rel=0.05)
+
+
+def test_the_noise_of_one_reading_is_at_least_what_its_display_makes(tmp_path: Path) -> None:
+    recorded = loops()
+    noise = 0.2 * np.random.default_rng(1).standard_normal(len(recorded.force))
+    found = read(make(tmp_path, loops=replace(recorded, force=recorded.force + noise).text())).loops
+    assert found is not None
+    assert force_noise(found) == reading_noise(found) == pytest.approx(0.2, rel=0.2)
+    coarse = replace(found, force_N=np.round(found.force_N / 20.0) * 20.0)
+    assert reading_noise(coarse) == pytest.approx(20.0 / np.sqrt(12.0))

@@ -1,0 +1,88 @@
+"""Whether the fitted noise is the sensor's: a misfit that no other part can hold goes into it."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from mpam_calib.model.noise import WHITE
+from mpam_calib.report.blocks import Level
+from mpam_calib.report.limit import Limit
+from mpam_calib.report.numbers import significant
+from mpam_calib.report.view import CalibrationView
+
+NOISE_CAUTION: Final = 3.0
+NOISE_BAD: Final = 10.0
+"""Fitted noise over what is known of it ..."""
+NOISE_BAD_SHARE: Final = 0.05
+"""... and over the top force, where the numbers cannot be used, and where lasting noise is not ordinary."""
+NEGLIGIBLE: Final = 0.005
+"""Noise up to this share of the top force is worth no word."""
+
+
+def noise_size(view: CalibrationView) -> Limit | None:
+    """The fitted noise is far above what readings scatter by from one to the next, or what is declared.
+
+    Noise that lasts for longer than a reading is a parameter of its own, and ordinary unless it is huge.
+    """
+    fitted, top = _fitted(view), top_force(view)
+    reading, declared = _known(view.reading_noise), _known(view.declared_noise)
+    beside = f"{_newtons(reading)} from reading to reading" if reading else ""
+    if fitted > NEGLIGIBLE * top > 0.0:
+        if reading and fitted > NOISE_CAUTION * reading:
+            return _misfit(_level(fitted, reading, top), fitted, beside)
+        if declared and fitted > NOISE_CAUTION * declared:
+            words = f"the declared force_sd_N = {declared:g}"
+            return (
+                _noisier(fitted, words) if reading else _misfit(_level(fitted, declared, top), fitted, words)
+            )
+    if reading and _level(view.noise, reading, top) == "bad":
+        return _misfit("caution", view.noise, beside)
+    return None
+
+
+def noise_known(view: CalibrationView) -> bool:
+    """Whether there is anything to compare the fitted noise with."""
+    known = any(_known(noise) is not None for noise in (view.reading_noise, view.declared_noise))
+    return math.isfinite(_fitted(view)) and known
+
+
+def _level(fitted: float, known: float, top: float) -> Level:
+    return "bad" if fitted > NOISE_BAD * known and fitted > NOISE_BAD_SHARE * top > 0.0 else "caution"
+
+
+def _misfit(level: Level, fitted: float, beside: str) -> Limit:
+    words = f"hat the simulation misses went into the noise: {_newtons(fitted)} against {beside}"
+    sentence = (
+        f"W{words}. Levels that are mixed up, a few wild readings or a wrong simulation do this; that the "
+        "simulation fits to within such noise means nothing."
+    )
+    return Limit(level, sentence, f"w{words}")
+
+
+def _noisier(fitted: float, beside: str) -> Limit:
+    sentence = (
+        f"The readings scatter by {_newtons(fitted)}, against {beside}. The bands follow the readings; look "
+        "at the load cell or at the declaration."
+    )
+    return Limit("caution", sentence, "the load cell is noisier than declared")
+
+
+def _newtons(force: float) -> str:
+    return f"{significant(force, 2)} N"
+
+
+def _fitted(view: CalibrationView) -> float:
+    rows = view.summary[view.summary["parameter"] == WHITE]
+    return math.nan if rows.empty or view.tensile else float(rows["mean"].iloc[0])
+
+
+def _known(noise: float) -> float | None:
+    return noise if noise > 0.0 else None
+
+
+def top_force(view: CalibrationView) -> float:
+    """The largest pull that was recorded, N; robust against single wild readings."""
+    rows = view.readings("loops", "force_map", "blocked_force")
+    force = rows.loc[~rows["censored"].astype(bool), "force_N"].abs()
+    return float(force.quantile(0.99)) if len(force) else 0.0

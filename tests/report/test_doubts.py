@@ -1,0 +1,88 @@
+"""Data to be doubted first: slack that the fit does not believe, wandering levels, stray readings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+from model import build
+
+from mpam_calib.report import doubts
+from mpam_calib.report.view import CalibrationView
+from mpam_calib.specimen.oddities import level_stray
+
+from .synthetic import muscle
+
+
+@pytest.fixture(scope="module")
+def sound() -> CalibrationView:
+    return muscle(n_draws=400)
+
+
+def with_slack(
+    view: CalibrationView, contraction: float, kind: str = "force_map", floor: float = 0.0
+) -> CalibrationView:
+    """One more reading, at 100 kPa, that is said to be slack."""
+    row = {"kind": kind, "level_kPa": 100.0, "pressure_kPa": 100.0, "contraction": contraction, "branch": ""}
+    slack = pd.DataFrame([row | {"force_N": floor, "fitted_N": 0.0, "censored": True}])
+    blocked = view.bands[(view.bands["quantity"] == "force_N_observed") & (view.bands["contraction"] == 0.0)]
+    blocked = blocked[blocked["branch"] == "mean"].assign(quantity="blocked_force_N_observed")
+    return replace(view, observed=pd.concat([view.observed, slack]), bands=pd.concat([view.bands, blocked]))
+
+
+@pytest.mark.parametrize("kind", ["force_map", "blocked_force"])
+def test_slack_where_the_fit_pulls(sound: CalibrationView, kind: str) -> None:
+    limit = doubts.overruled_slack(with_slack(sound, 0.0, kind))
+    assert limit is not None and limit.level == "caution"
+    assert limit.brief == "1 slack reading, at 100 kPa, is not believed"
+    assert "up to 35 N" in limit.sentence
+
+
+@pytest.mark.parametrize(
+    ("contraction", "floor"),
+    [(0.5, 0.0), (0.272, 0.0), (0.0, 35.0)],  # past the free contraction, just before it, a floor that high
+)
+def test_slack_that_is_believed(sound: CalibrationView, contraction: float, floor: float) -> None:
+    assert doubts.overruled_slack(with_slack(sound, contraction, floor=floor)) is None
+    assert doubts.overruled_slack(sound) is None
+
+
+@pytest.mark.parametrize(
+    ("level", "stray", "told"),
+    [
+        (100.0, 60.0, True),
+        (100.0, 15.0, False),
+        (1.0, 3.0, False),  # a gauge's noise at a level near zero
+    ],
+)
+def test_a_level_that_wanders(sound: CalibrationView, level: float, stray: float, told: bool) -> None:
+    levels = (level, *sound.levels_kPa[1:])
+    limit = doubts.wandering(
+        replace(sound, levels_kPa=levels, strays_kPa=(stray, *(0.0 for _ in levels[1:])))
+    )
+    assert (limit is not None) == told
+    if limit is not None:
+        assert limit.level == "bad"
+        assert limit.brief == "the pressure of the level 100 kPa wanders by 60 kPa"
+
+
+def test_how_far_readings_stray_from_their_level() -> None:
+    loops = build.loops()
+    levels = build.specimen({}, loops).levels_Pa
+    assert level_stray(loops, levels, 1) == pytest.approx(0.0, abs=1e-6)
+    mixed = replace(loops, pressure_Pa=loops.pressure_Pa * (1.0 + 0.6 * (loops.stroke % 2)))
+    assert level_stray(mixed, levels, 1) == pytest.approx(0.6 * levels[1])
+    changed = replace(mixed, branch=2 * mixed.branch)  # pressurised on purpose
+    assert level_stray(changed, levels, 1) == 0.0
+
+
+def test_what_check_asks_is_repeated_where_the_verdict_is_no_yes(sound: CalibrationView) -> None:
+    """Readings that were left out are no doubt; units only where nothing fits."""
+    stray = "loops: a force is far from all others (1e+05 N at 3 s)"
+    units = "loops: forces up to 9 N, while the gas alone pulls about 90 N; are the units right?"
+    warned = replace(sound, warnings=["loops: 4 readings at turns are left out", stray, units])
+    assert doubts.look_first(warned, "good") == ""
+    assert doubts.look_first(warned, "caution") == f"Look at the data first: {stray}"
+    assert doubts.look_first(warned, "bad") == f"Look at the data first: {stray}; {units}"
+    assert doubts.look_first(sound, "bad") == ""
