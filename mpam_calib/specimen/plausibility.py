@@ -21,7 +21,10 @@ LEAST_ROWS = 4
 """Rows that a stroke needs, for the way it goes to be told from noise."""
 LONG_SHARE = 0.1
 """Share of the rows that are taken as those where the muscle is long."""
-MOST = {"force_N": 1e6, "pressure_kPa": 1e9, "displacement_mm": 1e5, "contraction": 1e2, "stress_Pa": 1e10}
+MOST = {
+    "force_N": 1e6, "pressure_kPa": 1e9, "displacement_mm": 1e5, "contraction": 1e2, "stress_Pa": 1e10,
+    "setpoint_kPa": 1e9, "cycle": 1e9, "time_s": 1e15, "temperature_C": 1e3,
+}  # fmt: skip
 """Sizes of readings, in the files' units, that no rig for such muscles reads."""
 AGAINST = 0.8
 """Share of all motion against its branch's direction from which the words are taken for swapped."""

@@ -93,6 +93,15 @@ def test_a_code_for_no_reading_is_refused_where_it_stands(
     assert message.startswith(f"loops.csv:22:{name}: found {code:g} (a code for no reading?)")
 
 
+@pytest.mark.parametrize("name", ["cycle", "setpoint_kPa", "temperature_C"])
+def test_such_a_code_in_a_column_beside_them(name: str, tmp_path: Path) -> None:
+    header, *rows = loops().text().splitlines()
+    beside = ["9.9e37" if i == 20 else "1" for i in range(len(rows))]
+    lines = [f"{header},{name}", *(f"{row},{cell}" for row, cell in zip(rows, beside, strict=True))]
+    message = refused(make(tmp_path, loops="\n".join(lines) + "\n"))
+    assert message.startswith(f"loops.csv:22:{name}: found 9.9e+37 (a code for no reading?)")
+
+
 def test_such_a_code_in_a_force_map_and_a_tensile_test(tmp_path: Path) -> None:
     rows = "".join(f"{P},{g},{P / 5}\n" for P in (50, 100) for g in (0.0, 0.05, 0.1))
     text = f"pressure_kPa,contraction,force_N\n{rows}100,0.12,9.9e37\n"
