@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ def rubber() -> mc.Specimen:
     return mc.read(ROOT / "datasets" / "ecoflex_tension")
 
 
-CALIBRATE = {
+CALIBRATE: dict[str, tuple[dict[str, Any], str]] = {
     "a seed below 0": ({"seed": -1}, "--seed: found -1, expected a whole number from 0 upwards"),
     "a seed that is a fraction": ({"seed": 1.5}, "--seed: found 1.5, expected a whole number"),
     "a seed in words": ({"seed": "one"}, "--seed: found str 'one', expected a whole number"),
@@ -33,7 +34,7 @@ CALIBRATE = {
 def test_an_option_of_calibrate_that_means_nothing(name: str, rubber: mc.Specimen) -> None:
     options, said = CALIBRATE[name]
     with pytest.raises(mc.InputError) as error:
-        mc.calibrate(rubber, **options)  # type: ignore[arg-type]
+        mc.calibrate(rubber, **options)
     assert str(error.value).startswith(said)
 
 
@@ -54,10 +55,10 @@ def test_what_is_no_specimen(given: object, function: Callable[[object], object]
     ],
 )
 def test_an_option_of_simulate_that_means_nothing(
-    options: dict[str, object], said: str, rubber: mc.Specimen
+    options: dict[str, Any], said: str, rubber: mc.Specimen
 ) -> None:
     with pytest.raises(mc.InputError) as error:
-        mc.simulate(rubber, **options)  # type: ignore[arg-type]
+        mc.simulate(rubber, **options)
     assert str(error.value).startswith(said)
 
 

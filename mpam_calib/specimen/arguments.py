@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from numbers import Integral, Real
+from typing import TypeGuard
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.recording import Specimen
@@ -22,11 +23,11 @@ def demand_whole(option: str, given: object, least: int) -> None:
 
 def demand_number(option: str, given: object, least: float) -> None:
     """Raise ``InputError`` unless an option is a finite number from ``least`` upwards."""
-    if not is_number(given) or not least <= float(given) < float("inf"):  # type: ignore[arg-type]
+    if not is_number(given) or not least <= float(given) < float("inf"):
         raise InputError(option, _shown(given), f"a number from {least:g} upwards")
 
 
-def is_number(given: object) -> bool:
+def is_number(given: object) -> TypeGuard[float]:
     """Whether something is a number, of Python or of numpy."""
     return isinstance(given, Real) and not isinstance(given, bool)
 

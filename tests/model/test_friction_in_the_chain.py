@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,9 +58,9 @@ def test_the_order_of_declaration_does_not_count() -> None:
 
 
 @pytest.mark.parametrize("simulation", [{"friction": "strand"}, {"effects": ("strand_friction",)}])
-def test_strands_rub_finitely_where_tips_take_the_whole_length(simulation: dict[str, object]) -> None:
+def test_strands_rub_finitely_where_tips_take_the_whole_length(simulation: dict[str, Any]) -> None:
     short = Geometry(L0_mm=20.0, R0_mm=3.0, t0_mm=0.7, alpha0_deg=72.0)
-    effects = (*simulation.get("effects", ()), "tip_shape")  # type: ignore[misc]
+    effects = (*simulation.get("effects", ()), "tip_shape")
     made = model(**{**simulation, "effects": effects, "geometry": short})
     found = friction(made, stroke=0.012, f_s=0.3, tip_factor=2.0)
     assert np.all(np.isfinite(found)) and np.all(found > 0.0)
