@@ -26,10 +26,14 @@ FAR = 30.0
 """... and this many times as large is far from them."""
 GAS = 3.0
 """Forces of muscles are within this factor of what the gas alone pulls."""
+BELOW_GAS = 10.0
+"""A bladder that is not stretched beyond L0 adds no such multiple of the gas's own pull."""
 SLOW_HZ, FAST = 0.05, 0.2
 """Readings rarer than this, and crossheads faster (m/s), are no tensile tester's."""
 STIFFNESS_PA = 100.0, 1e11
 """Between these are the moduli of everything that a bladder is made of, and far beyond."""
+STRETCHED = 0.01
+"""A bladder that is longer than at rest by more than this share pulls by itself."""
 SMALL_SHARE = 0.12
 """Contractions that stay below this share of what the braid allows may be in other units."""
 
@@ -146,6 +150,28 @@ def _odd_forces(specimen: Specimen) -> list[str]:
             remarks.append(
                 f"{name}: forces up to {usual:.3g} N, while the gas alone pulls about {gas:.3g} N at the "
                 "highest pressure; are the units of force and pressure right, and R0_mm a radius?"
+            )
+    return remarks + _odd_level_forces(specimen)
+
+
+def _odd_level_forces(specimen: Specimen) -> list[str]:
+    """Levels of loops whose force is like the others', under a pressure that is not: one file in bar."""
+    loops, geometry = specimen.loops, specimen.geometry
+    assert geometry is not None
+    if loops is None or len(np.unique(loops.level)) < 2:
+        return []
+    remarks, top = [], {}
+    for index in np.unique(loops.level):
+        at = loops.level == index
+        pulls = float(np.quantile(loops.force_N[at], USUAL_SHARE))
+        top[int(index)] = pulls if loops.displacement_m[at].min() > -STRETCHED * geometry.L0 else 0.0
+    for index, pulls in top.items():
+        gas = _gas_force(geometry, float(specimen.levels_Pa[index]), 0.0)
+        others = float(np.median([force for other, force in top.items() if other != index]))
+        if pulls > BELOW_GAS * gas and pulls > 0.5 * others:
+            remarks.append(
+                f"loops: forces up to {pulls:.3g} N at {specimen.levels_Pa[index] / KPA:.4g} kPa, where "
+                f"the gas pulls about {gas:.2g} N; is every file's pressure in kPa, and the load cell zeroed?"
             )
     return remarks
 
