@@ -28,6 +28,7 @@ from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.bins import LoopBins, bin_loops
 from mpam_calib.posterior.covariance import StrokeCovariance
 from mpam_calib.posterior.points import gather_points
+from mpam_calib.posterior.tested_moduli import moduli_of_test
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.specimen.summary import noise_within
 
@@ -245,7 +246,12 @@ class Problem:
 
 
 def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
-    """Reduce a specimen's muscle data; ``blueprint`` is the declared simulation's without nuisances."""
+    """Reduce a specimen's muscle data; ``blueprint`` is the declared simulation's without nuisances.
+
+    The moduli of a tensile test have their prior from it.
+    """
+    if blueprint.material is None and (tested := moduli_of_test(specimen)) is not None:
+        blueprint = blueprint.model_copy(update={"material": tested})
     model = build_model(blueprint)
     assert model.setting is not None
     scale = model.setting.force_scale

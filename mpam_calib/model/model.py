@@ -83,7 +83,11 @@ def build_model(blueprint: Blueprint) -> Model:
     setting = blueprint.setting()
     options, simulation = blueprint.options, blueprint.simulation
     tensile = None
-    if blueprint.tensile_range is not None and (setting is None or simulation.moduli == "tensile"):
+    if (
+        blueprint.tensile_range is not None
+        and blueprint.material is None
+        and (setting is None or simulation.moduli == "tensile")
+    ):
         tensile = TensileModel(*blueprint.tensile_range, simulation.order, simulation.strain)
     moduli = _moduli(blueprint, setting, tensile)
     extra: list[Parameter] = []

@@ -21,7 +21,7 @@ from mpam_calib.model.model import CONTRACTION_SD, Model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
-from mpam_calib.posterior.algebra import LOG_2PI, condense, log_determinant, solve_transposed
+from mpam_calib.posterior.algebra import LOG_2PI, condense, inverse, log_determinant, solve_transposed
 from mpam_calib.posterior.bins import SLACK_ABOVE, LoopBins
 from mpam_calib.posterior.covariance import StrokeCovariance, fast_noise_covariance, fast_noise_log_likelihood
 from mpam_calib.posterior.piece import Piece, forget, segment_piece, total, white_piece
@@ -104,6 +104,11 @@ class Collapsed:
         """Conditional mean (B, k) of η."""
         _, centre, factor = self._solve(values)
         return solve_transposed(factor, centre)
+
+    def linear_moments(self, values: Values) -> tuple[Array, Array]:
+        """Conditional mean (B, k) and covariance (B, k, k) of η."""
+        _, centre, factor = self._solve(values)
+        return solve_transposed(factor, centre), inverse(factor @ np.swapaxes(factor, 1, 2))
 
     def _solve(self, values: Values) -> tuple[Array, Array, Array]:
         """ln p(y | θ), and L⁻¹ h (B, k) with the Cholesky factor L of S (B, k, k): the mean is L⁻ᵀ L⁻¹ h."""

@@ -135,5 +135,10 @@ def find_modes(target: Collapsed, rng: np.random.Generator) -> list[Mode]:
         # Under one large noise the draws that fit best come first, not those that happen to have much of it.
         draws[:, target.model.names.index(name)] = LOUD
     best = draws[np.argsort(-evaluate(target, draws))[:CLIMBED]]
-    centre = np.zeros(d)
-    return climb_modes(target, [centre, _structured(target, centre), *best])
+    return climb_modes(target, [*starts(target), *best])
+
+
+def starts(target: Collapsed) -> list[Array]:
+    """The priors' centre (d,), and a place that takes the misfit for structure."""
+    centre = np.zeros(len(target.model.names))
+    return [centre, _structured(target, centre)]

@@ -1,0 +1,68 @@
+"""What a tensile test says of the moduli, before any muscle is looked at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from model import build
+
+from mpam_calib.calibration import calibrate
+from mpam_calib.posterior.draws import reported
+from mpam_calib.posterior.tested_moduli import moduli_of_test
+from mpam_calib.specimen.declaration import Simulation
+from mpam_calib.specimen.recording import Specimen, Tensile
+
+MODULI = np.array([6.0e4, -2.0e4, 8.0e3])
+TENSILE = {"moduli": "tensile", "order": 3, "law": "constant"}
+
+
+def rubber(
+    seed: int, noise_Pa: float = 400.0, bend_Pa: float = 0.0, simulation: dict | None = None
+) -> Specimen:
+    """A tensile test of 40 readings up to a strain of 1.2; ``bend_Pa`` is in no polynomial of these."""
+    strain = np.linspace(0.03, 1.2, 40)
+    stress = strain[:, None] ** np.arange(1, 4) @ MODULI + bend_Pa * np.tanh((strain - 0.6) / 0.05)
+    stress = stress + noise_Pa * np.random.default_rng(seed).standard_normal(len(strain))
+    made = build.specimen(simulation or TENSILE, levels_kPa=())
+    return replace(made, tensile=Tensile(strain, stress), geometry=None, braid=None)
+
+
+@pytest.mark.parametrize("bend", [0.0, 3000.0])
+def test_moments_are_those_of_the_sampled_posterior(bend: float) -> None:
+    made = rubber(1, bend_Pa=bend)
+    found = moduli_of_test(made)
+    assert found is not None
+    sampled = calibrate(made, seed=3)
+    draws = {r.name: r.draws for r in reported(sampled.model, sampled.draws)}
+    each = np.stack([draws[f"E_{k}"] for k in (1, 2, 3)])
+    sd = np.sqrt(np.diagonal(found.covariance))
+    assert np.abs(np.array(found.mean) - each.mean(axis=1)) == pytest.approx(
+        0.0, abs=float(np.max(0.15 * sd))
+    )
+    assert sd == pytest.approx(each.std(axis=1), rel=0.1)
+    correlated = np.array(found.covariance) / np.outer(sd, sd)
+    assert correlated == pytest.approx(np.corrcoef(each), abs=0.02)
+
+
+def test_true_moduli_are_as_often_inside_as_said() -> None:
+    """At least nine times in ten: what the polynomial might leave about doubles the moduli's sds."""
+    inside, wider = 0, []
+    for seed in range(60):
+        made = rubber(seed)
+        found = moduli_of_test(made)
+        assert found is not None and made.tensile is not None
+        off, covariance = MODULI - np.array(found.mean), np.array(found.covariance)
+        inside += off @ np.linalg.solve(covariance, off) < 6.251  # chi-squared's 90th percentile
+        powers = made.tensile.strain[:, None] ** np.arange(1, 4)
+        least_squares = 400.0**2 * np.linalg.inv(powers.T @ powers)
+        wider.append(np.sqrt(np.diagonal(covariance) / np.diagonal(least_squares)))
+    assert inside >= 49  # 1 in 100 below, were it 90 in 100
+    assert np.min(wider) > 1.0 and np.mean(wider) < 3.0
+
+
+def test_moduli_from_elsewhere_are_not_looked_for() -> None:
+    free = {"order": 2, "law": "linear"}
+    assert moduli_of_test(rubber(0, simulation=free)) is None
+    assert moduli_of_test(replace(rubber(0), tensile=None, simulation=Simulation(**free))) is None
