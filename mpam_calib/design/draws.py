@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.design.problem import E_BR, Function
 from mpam_calib.model.chain import Chain
+from mpam_calib.model.effect import effect
 from mpam_calib.model.model import Model
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import SMOOTH
@@ -35,7 +36,7 @@ class MuscleDraws:
     """A model with N draws of its posterior and of the tolerances to which a new muscle is built.
 
     ``tolerance``: SI deviations (N, 1) from the drawing, by the names of the geometry's values. What
-    the run found of its own specimen's geometry is not carried over: a new muscle has its own.
+    the run found of its own specimen's geometry, or of its rig, is not carried over.
     """
 
     model: Model
@@ -95,16 +96,15 @@ class MuscleDraws:
         """
         setting = self.model.setting
         assert setting is not None
+        effects = tuple(e for e in setting.simulation.effects if not effect(e).of_test)
         if x.shape[-1] == 5:
             # One value for each design: the effects broadcast, which a declared braid need not.
             strands = {"R_br_mm": x[:, 3] / MM, "n": x[:, 4]}
-            braid = self._braid().model_copy(update=strands)
-            effects = setting.simulation.effects
+            setting = replace(setting, braid=self._braid().model_copy(update=strands))
             if not self._has_strands:
                 effects = (*effects, STRANDS)
-            simulation = setting.simulation.model_copy(update={"effects": effects})
-            setting = replace(setting, braid=braid, simulation=simulation)
-        return Chain(setting, self.model.moduli)
+        simulation = setting.simulation.model_copy(update={"effects": effects})
+        return Chain(replace(setting, simulation=simulation), self.model.moduli)
 
     @property
     def _has_strands(self) -> bool:

@@ -62,11 +62,11 @@ class MaterialPosterior(Value):
 class Blueprint(Value):
     """Declaration and design of one specimen, SI units.
 
-    ``stroke`` (m) is the largest recorded displacement, ``reach`` the largest contraction at each
-    level, ``pulls_at`` (Pa) the lowest pressure with a clear pull, ``stroke_time`` (s) the median
-    duration of a stroke (None without loops) ``reading_time`` (s) that between two readings,
-    ``duration`` (s) that of the whole test, ``level_time`` (s) the longest at one level and ``speed`` (m/s)
-    the geometric mean of the strokes' speeds.
+    ``stroke`` (m) is the largest recorded displacement, ``reach`` the largest contraction at each level,
+    ``onset`` the least with a force there (empty: nothing recorded), ``pulls_at`` (Pa) the lowest pressure
+    with a clear pull, ``stroke_time`` (s) the median duration of a stroke (None without loops),
+    ``reading_time`` (s) that between two readings, ``duration`` (s) that of the whole test, ``level_time``
+    (s) the longest at one level and ``speed`` (m/s) the geometric mean of the strokes' speeds.
     """
 
     simulation: Simulation
@@ -84,6 +84,7 @@ class Blueprint(Value):
     level_time: float = 0.0
     speed: float = 50.0 * MM / MINUTE
     branches: bool
+    onset: tuple[float, ...] = ()
     free_contraction: bool
     tensile_range: tuple[float, float] | None
     tensile_tested: tuple[float, float] | None = None
@@ -134,6 +135,7 @@ def draw_blueprint(
         levels=tuple(float(level) for level in specimen.levels_Pa),
         stroke=stroke,
         reach=tuple(float(r) for r in reach),
+        onset=_onset(specimen),
         pulls_at=_pulls_at(specimen),
         stroke_time=None if loops is None else _stroke_time(loops),
         reading_time=0.0 if loops is None else _reading_time(loops),
@@ -167,6 +169,29 @@ def _reach(specimen: Specimen) -> Array:
         here = own | same_level(free.pressure_Pa, levels[nearest])
         np.maximum.at(reach, nearest[here], free.contraction[here])
     return reach
+
+
+def _onset(specimen: Specimen) -> tuple[float, ...]:
+    """Least contraction with a known force at each level (levels,); beside no reading the neighbours'.
+
+    A free contraction tells that the force is zero there.
+    """
+    levels, loops, grid = specimen.levels_Pa, specimen.loops, specimen.force_map
+    onset = np.full(len(levels), np.inf)
+    if specimen.geometry is None:
+        return ()
+    if loops is not None:
+        np.minimum.at(onset, loops.level, loops.displacement_m / specimen.geometry.L0)
+    if grid is not None:
+        np.minimum.at(onset, grid.level[~grid.censored], grid.contraction[~grid.censored])
+    if (blocked := specimen.blocked_force) is not None:
+        pulling = blocked.pressure_Pa[~blocked.censored]
+        onset[np.abs(pulling[:, None] - levels).argmin(axis=1)] = 0.0
+    if (free := specimen.free_contraction) is not None:
+        nearest = np.abs(free.pressure_Pa[:, None] - levels).argmin(axis=1)
+        np.minimum.at(onset, nearest, free.contraction)
+    known = np.isfinite(onset)
+    return tuple(map(float, np.interp(levels, levels[known], onset[known]))) if known.any() else ()
 
 
 def _pulls_at(specimen: Specimen) -> float:

@@ -61,7 +61,7 @@ class Effect:
     makes use of, where not of all, ``recalls`` the forms that have a memory and ``by_force`` those that need
     the force, though the effect does not, ``apart`` those that no bend stands for, and ``sources`` where the
     forms' equations are from. A ``fault`` of an instrument is no cause to be searched, named or declared, but
-    a rival of all causes.
+    a rival of all causes. What is ``of_test``, the tested specimen's own or its rig's, no other design has.
     """
 
     id: str
@@ -88,6 +88,7 @@ class Effect:
     apart: tuple[str, ...] = ()
     sources: Mapping[str, str] = field(default_factory=dict)
     fault: bool = False
+    of_test: bool = False
 
     def __reduce__(self) -> tuple[Callable[[str], Effect], tuple[str]]:
         """Another process looks the effect up: what it does need not be sendable."""

@@ -39,26 +39,26 @@ def muscle_bands(model: Model, draws: Draws, pressures: Array, seed: int, trim: 
 
     Curves end at the first grid point at or beyond the mean free contraction (``trim``).
     """
-    reach = Reach(np.array(model.blueprint.levels), np.array(model.blueprint.reach))
+    reach = Reach.of(model.blueprint)
     grid = contraction_grid(model, float(reach.contraction.max()))
     curves = force_curves(model, draws.thin(DRAWS), pressures, grid, seed)
     rng = np.random.default_rng([seed, 5])
     free = first_root(grid, curves.force[:, :, 2])
     outside = reach.outside(pressures)
-    limit = reach.at(pressures)
+    at = pressures[:, None]
+    unseen = reach.beyond(at, grid) | reach.before(at, grid) | outside[:, None]
     parts = []
     for observed in (False, True):
         noise = curves.noise.draw(curves.force[:, :, 2], rng) if observed else 0.0
         suffix = "_observed" if observed else ""
         for j, branch in enumerate(BRANCHES):
-            far = grid[None, :] > limit[:, None] * 1.02 + 1e-3
             table = _table(f"force_N{suffix}", pressures, grid, branch, curves.force[:, :, j] + noise)
-            table["extrapolated"] = (outside[:, None] | far).ravel()
+            table["extrapolated"] = unseen.ravel()
             if trim:
                 end = np.searchsorted(grid, free.mean(axis=0) - 1e-12)
                 table = table[(np.arange(len(grid))[None, :] <= end[:, None]).ravel()]
             parts.append(table)
-        parts.append(_blocked(curves, suffix, rng, outside))
+        parts.append(_blocked(curves, suffix, rng).assign(extrapolated=unseen[:, 0]))
         contraction = free
         if observed:
             # The cell's noise moves the point where the force is read as zero.
@@ -68,20 +68,16 @@ def muscle_bands(model: Model, draws: Draws, pressures: Array, seed: int, trim: 
         table = _table(f"free_contraction{suffix}", pressures, np.zeros(1), "", contraction[:, :, None])
         # A curve that never reaches zero ends at the grid's edge: that is no free contraction.
         rootless = np.mean(free >= grid[-1], axis=0) > ROOTLESS
-        table["extrapolated"] = outside | rootless | (free.mean(axis=0) > limit * 1.02 + 1e-3)
+        table["extrapolated"] = outside | rootless | reach.beyond(pressures, free.mean(axis=0))
         parts.append(table.assign(contraction=np.nan))
     return pd.concat(parts, ignore_index=True)[COLUMNS]
 
 
-def _blocked(
-    curves: Curves, suffix: str, rng: np.random.Generator, outside: NDArray[np.bool_]
-) -> pd.DataFrame:
+def _blocked(curves: Curves, suffix: str, rng: np.random.Generator) -> pd.DataFrame:
     blocked = curves.force[:, :, 2, 0]
     if suffix:
         blocked = blocked + curves.noise.draw(blocked, rng)
-    table = _table(f"blocked_force_N{suffix}", curves.pressures, np.zeros(1), "", blocked[:, :, None])
-    table["extrapolated"] = outside
-    return table
+    return _table(f"blocked_force_N{suffix}", curves.pressures, np.zeros(1), "", blocked[:, :, None])
 
 
 def stress_bands(model: Model, draws: Draws, seed: int) -> pd.DataFrame:

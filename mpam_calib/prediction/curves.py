@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import CONTRACTION_SD, Model
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.reference import geometric_contraction, rest_of
@@ -28,6 +29,9 @@ LIMIT = 0.6
 """Largest contraction that is looked at."""
 GRID = np.arange(round(LIMIT / STEP) + 1, dtype=np.float64) * STEP
 """Contractions on which the first root is looked for, shape (γ,)."""
+PAST, SHORT = 0.02, 0.05
+"""Shares of the recorded contraction beyond its ends that are still as recorded: a test begins with some
+slack taken up."""
 BEYOND = 1.1
 """Curves are drawn so many times as far as any muscle comes."""
 
@@ -120,10 +124,26 @@ def first_root(contractions: Array, force: Array) -> Array:
 
 @dataclass(frozen=True)
 class Reach:
-    """Where the data end: pressures (Pa) and the largest contraction at each."""
+    """Where the data end: pressures (Pa), the largest contraction at each, and the least with a force."""
 
     pressures: Array
     contraction: Array
+    onset: Array
+
+    @classmethod
+    def of(cls, blueprint: Blueprint) -> Reach:
+        """That of the recordings that a blueprint was drawn from."""
+        levels = np.array(blueprint.levels)
+        return cls(levels, np.array(blueprint.reach), np.array(blueprint.onset or np.zeros(len(levels))))
+
+    def beyond(self, pressure: Array, contraction: Array) -> NDArray[np.bool_]:
+        """Whether a contraction lies past the largest recorded one."""
+        return np.asarray(contraction > self.at(pressure) * (1.0 + PAST) + 1e-3)
+
+    def before(self, pressure: Array, contraction: Array) -> NDArray[np.bool_]:
+        """Whether a contraction lies short of the least that a force was recorded at."""
+        onset = np.interp(pressure, self.pressures, self.onset)
+        return np.asarray(contraction < onset - SHORT * self.at(pressure) - 1e-3)
 
     def at(self, pressure: Array) -> Array:
         """Largest recorded contraction, interpolated."""

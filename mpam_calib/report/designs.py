@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.design.robust import Design, Packed
 from mpam_calib.model.blueprint import Blueprint
+from mpam_calib.model.effect import effect
 from mpam_calib.prediction.curves import LIMIT, Reach
 from mpam_calib.prediction.strain_range import MUSCLE
 from mpam_calib.report.design_bounds import beyond_bounds, within
@@ -98,7 +99,7 @@ class DesignsView:
     @property
     def reach(self) -> Reach:
         """Where the recordings end."""
-        return Reach(self.levels, np.array(self.blueprint.reach))
+        return Reach.of(self.blueprint)
 
     def best(self, case: str, method: str = "posterior_mean") -> list[Design]:
         """The designs of a case by one method, by pressure."""
@@ -208,9 +209,7 @@ def _trust(view: DesignsView) -> Verdict:
             f"law ({law.replace('_', ' ')}) is extrapolated, {LAWS[law]}, and the bands hold the law's "
             "constants, not the doubt about its shape."
         )
-    far = [
-        d for d in view.best("II") if d.contraction.mean() > float(view.reach.at(np.array(d.P))) * 1.02 + 1e-3
-    ]
+    far = [d for d in view.best("II") if bool(view.reach.beyond(np.array(d.P), d.contraction.mean()))]
     if far:
         listed = ", ".join(f"{d.P / KPA:.0f}" for d in far)
         reasons.append(f"Free contraction lies beyond the recorded contractions at {listed} kPa (Case II).")
@@ -312,6 +311,10 @@ def _bands(view: DesignsView) -> Section:
     sds = {k: v for k, v in blueprint.geometry.sd.model_dump().items() if v > 0.0}
     told = ", ".join(f"{name} {value:g}" for name, value in sds.items()) or "none is declared"
     effects = blueprint.simulation.effects
+    left = [e for e in effects if effect(e).of_test]
+    carried = [e for e in effects if e not in left]
+    of_test = f", and so does what it found about its rig or build ({', '.join(left)})" if left else ""
+    gauge = " and the gauge's offset" if blueprint.sensors.pressure_bias_sd_kPa > 0.0 else ""
     strands = (
         "the fitted multiple of it"
         if any(e.startswith("braid_stretch") for e in effects)
@@ -327,11 +330,12 @@ def _bands(view: DesignsView) -> Section:
         [
             Text(
                 f"Every draw of the posterior goes through the model itself, with its effects "
-                f"({', '.join(effects) or 'none declared'}) and the gauge's offset, at the new geometry. "
+                f"({', '.join(carried) or 'none declared'}){gauge}, at the new geometry. "
                 "Moduli in engineering strain do not act on the blocked force, in stretch they do. "
                 "Manufacturing: "
                 f"every draw is built with its own deviation from the drawing, of the declared sd ({told}); "
-                "what the run found about the tested muscle's own geometry stays with that muscle. The "
+                "what the run found about the tested muscle's own geometry stays with that muscle"
+                f"{of_test}. The "
                 "remainder (what the physics left unexplained) is carried as the same share of the ideal gas "
                 "force at rest length. Left out: the sensor's noise, a single stroke's own remainder, and "
                 "friction, for the force is the mean of both branches.\n\n"

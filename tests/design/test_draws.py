@@ -195,3 +195,22 @@ def test_same_seed_same_table() -> None:
     assert tables[0].equals(tables[1]) and not tables[0].equals(tables[2])
     assert list(tables[0]["case"]) == ["I", "I", "II", "II"]
     assert tables[0]["n"].isna().tolist() == [False, False, True, True]
+
+
+def test_what_was_found_of_the_test_no_new_muscle_has() -> None:
+    """Zero, give and drift of the rig, and the error of one braid's angle."""
+    values = {
+        "offset_mm": 1.5 * MM,
+        "compliance_mm_per_N": 0.01 * MM,
+        "drift_N_per_min": 0.02,
+        "delta_alpha_deg": -1.5 * DEG,
+        "P_DB_kPa": 12e3,
+    }
+    names = ("length_offset", "rig_compliance", "force_drift", "braid_angle")
+    forces = []
+    for effects in (("dead_band",), ("dead_band", *names)):
+        made = model(effects=effects)
+        known = {name: np.full(50, value) for name, value in values.items() if name in made.names}
+        assert len(known) == len(effects)
+        forces.append(MuscleDraws.prepare(made, point(made, **known), 50, 0).blocked_forces(P, X))
+    assert forces[1] == pytest.approx(forces[0], rel=1e-12)

@@ -11,7 +11,7 @@ from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.report.design_bounds import beyond_bounds
 from mpam_calib.report.designs import DesignsView, designs_page
 from mpam_calib.report.page import DataTable, Headline, Notice, Numbers, Page
-from mpam_calib.specimen.declaration import Geometry, Simulation
+from mpam_calib.specimen.declaration import Geometry, Sensors, Simulation
 
 THESIS = Geometry(L0_mm=50.0, R0_mm=3.0, t0_mm=0.7, alpha0_deg=72.0)
 LARGE = Geometry(L0_mm=180.0, R0_mm=8.0, t0_mm=1.2, alpha0_deg=66.0)
@@ -43,7 +43,12 @@ def page(geometry: Geometry, tested: pd.DataFrame = TESTED, cautious: float = 0.
     ]
     # Only what the page reads: the recordings' own numbers say nothing here.
     blueprint = Blueprint.model_construct(
-        geometry=geometry, braid=None, simulation=Simulation(), levels=(1e5, 3e5), reach=(0.3, 0.3)
+        geometry=geometry,
+        braid=None,
+        sensors=Sensors(),
+        simulation=Simulation(),
+        levels=(1e5, 3e5),
+        reach=(0.3, 0.3),
     )
     view = DesignsView(
         "A", True, blueprint, designs, designs_table(designs), [Packed(P, 73.0, (designs[0].x,), (72.9,))],

@@ -44,6 +44,7 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
+        of_test=True,
         forms={"seating": _seating},
         own={"seating": _exponent},
         sources={"seating": "textbook: an angle that is off by δ·(P/P_middle)^m"},

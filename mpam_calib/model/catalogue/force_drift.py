@@ -106,6 +106,7 @@ register(
         source="linear in time over the whole test",
         parameters=_parameters,
         apply=_apply,
+        of_test=True,
         forms={
             "settling": _settling,
             "tared": _tared,

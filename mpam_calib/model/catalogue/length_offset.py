@@ -133,6 +133,7 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
+        of_test=True,
         forms={
             "scale": _scale,
             "line": _line,

@@ -77,6 +77,7 @@ register(
         parameters=_parameters,
         apply=_apply,
         memory=False,
+        of_test=True,
         uses_force=True,
         forms={"power": _power, "toe": _toe, "preload": _preload},
         own={"power": _exponent, "toe": _toe_force, "preload": _preload_force},

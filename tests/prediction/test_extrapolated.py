@@ -1,0 +1,68 @@
+"""What no reading comes near is marked, at both ends of the contraction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from model import build
+
+from mpam_calib.model.blueprint import draw_blueprint
+from mpam_calib.model.model import build_model
+from mpam_calib.posterior.draws import Draws
+from mpam_calib.prediction.bands import muscle_bands
+from mpam_calib.specimen.recording import BlockedForce, FreeContraction, Specimen
+
+TOP = 2e5
+FREE = {"pressure_Pa": np.array([1e5, 1.5e5, TOP]), "contraction": np.array([0.25, 0.28, 0.3])}
+
+
+def muscle(start_mm: float) -> Specimen:
+    """Loops at 100 to 200 kPa from a displacement to 10 mm on."""
+    recorded = build.loops()
+    moved = replace(recorded, displacement_m=recorded.displacement_m + 1e-3 * start_mm)
+    return build.with_force(build.specimen(None, moved), np.full(len(moved.time_s), 10.0))
+
+
+def marked(specimen: Specimen) -> pd.DataFrame:
+    model = build_model(draw_blueprint(specimen))
+    u = np.zeros((4, len(model.names)))
+    draws = Draws(u, model.values(u), np.zeros((4, sum(model.linear_sizes))), 1)
+    return muscle_bands(model, draws, np.array([TOP]), 0, trim=False).set_index("quantity")
+
+
+def contractions(bands: pd.DataFrame) -> np.ndarray:
+    """Contractions (50 mm is the muscle's length) whose force is not marked."""
+    rows = bands.loc["force_N"]
+    return rows.loc[~rows["extrapolated"] & (rows["branch"] == "mean"), "contraction"].to_numpy()
+
+
+def test_loops_from_the_full_length_on_support_the_blocked_force() -> None:
+    bands = marked(muscle(0.0))
+    assert not bands.loc["blocked_force_N", "extrapolated"]
+    assert contractions(bands).min() == 0.0 and 0.195 <= contractions(bands).max() <= 0.205
+
+
+def test_loops_that_start_far_from_it_do_not() -> None:
+    bands = marked(muscle(6.0))
+    assert (
+        bands.loc["blocked_force_N", "extrapolated"] and bands.loc["blocked_force_N_observed", "extrapolated"]
+    )
+    assert 0.1 <= contractions(bands).min() <= 0.125
+
+
+def test_blocked_forces_beside_them_do() -> None:
+    made = muscle(6.0)
+    blocked = BlockedForce(np.array([TOP]), np.array([80.0]), np.array([False]))
+    assert not marked(replace(made, blocked_force=blocked)).loc["blocked_force_N", "extrapolated"]
+    slack = replace(blocked, force_N=np.zeros(1), censored=np.array([True]))
+    assert marked(replace(made, blocked_force=slack)).loc["blocked_force_N", "extrapolated"]
+
+
+def test_free_contractions_say_nothing_of_the_force_before_them() -> None:
+    free = FreeContraction(**FREE)
+    made = build.specimen(None, levels_kPa=(100.0, 150.0, 200.0), free_contraction=free)
+    bands = marked(made)
+    assert bands.loc["blocked_force_N", "extrapolated"]
+    assert 0.27 <= contractions(bands).min() <= contractions(bands).max() <= 0.31
