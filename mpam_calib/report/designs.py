@@ -170,7 +170,8 @@ def _lead(view: DesignsView) -> list[Block]:
     )
     value, band = mean_band(one.force)
     cautious = view.best("II", "q05")[row]
-    q05 = float(np.quantile(cautious.force, 0.05))
+    # Rounded down: what is exceeded.
+    q05 = np.floor(10.0 * float(np.quantile(cautious.force, 0.05))) / 10.0
     cards = [
         KeyNumber("Case II", force, "N", f"90 % band: {force_band} N", "the wall and the angle chosen"),
         KeyNumber("Case I", value, "N", f"90 % band: {band} N", f"with {one.x[4]:.0f} strands chosen"),

@@ -29,7 +29,7 @@ TESTED = pd.DataFrame(
 
 
 def design(case: str, method: str, wall: float) -> Design:
-    draws = 73.0 + 0.1 * np.linspace(-1.0, 1.0, 50)
+    draws = 73.07 + 0.1 * np.linspace(-1.0, 1.0, 50)
     x = np.array([3e-3, wall, np.radians(72.0), 0.13e-3, 100.0])[: 5 if case == "I" else 3]
     return Design(case, P, method, x, draws, draws, 0.3 + 0.0 * draws, HELD)
 
@@ -112,3 +112,7 @@ def test_what_holds_a_design_stands_at_its_value() -> None:
     row = dict(zip(one.frame.columns, one.rows[0], strict=True))
     assert (row["R mm"], row["t mm"], row["α °"], row["n"]) == ("3.00↑", "0.676†", "72.0↑", "100")
     assert "held by" not in one.frame.columns
+
+
+def test_what_nineteen_in_twenty_exceed_is_not_rounded_up() -> None:
+    assert cards(page(THESIS))["Nineteen in twenty exceed"] == "72.9"  # of 72.98
