@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from mpam_calib.specimen.motion import run_ids, run_starts
-from mpam_calib.specimen.recording import Bools, Floats, Ints
+from mpam_calib.specimen.recording import (
+    DEPRESSURISING,
+    LOADING,
+    PRESSURISING,
+    UNLOADING,
+    Bools,
+    Floats,
+    Ints,
+)
 from mpam_calib.units import KPA
 
 SAME_LEVEL_PA = 1.0 * KPA
@@ -14,6 +22,10 @@ SAME_LEVEL_SHARE = 0.02
 """... or by less than this share of the level."""
 STEADY = 10
 """Rows that a commanded setpoint stays on average, at least."""
+TURNS = 0.1
+"""Share of a stroke's way, at either end, where a commanded setpoint may change: holds, ramps begun early."""
+ON_THE_WAY = 0.1
+"""Share of all its changes that a commanded setpoint may make between there; one that is read back makes most."""
 LEAST_RUN = 5
 """Fewer rows than this far from their stroke's level are noise, not a change of level."""
 SMALLEST_GAP_PA = 0.3 * KPA
@@ -61,16 +73,18 @@ def static_levels(pressure: Floats) -> Ints:
     return np.unique(labels * (cut.max() + 1.0) + cut, return_inverse=True)[1].astype(np.int64)
 
 
-def stroke_levels(pressure: Floats, units: Ints, steady: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Ints:
+def stroke_levels(
+    pressure: Floats, units: Ints, steady: Bools, gaps: tuple[float, float] = STROKE_GAPS
+) -> Ints:
     """Levels of loops recorded in time, shape (rows,), from 0 upwards.
 
     ``pressure`` in Pa; ``units`` numbers the strokes (contiguous runs, from 0); ``steady`` is false
     for rows whose pressure is being changed on purpose (pressurising, depressurising). The
-    strokes' medians are clustered; then runs of rows that are clearly at another level (a change
-    of pressure during a hold) are moved there. Where nothing but the pressure parts two strokes (each way
-    back was left out), it does.
+    strokes' medians are clustered (``gaps`` as in :func:`gap_clusters`); then runs of rows that are clearly
+    at another level (a change of pressure during a hold) are moved there. Where nothing but the pressure
+    parts two strokes (each way back was left out), it does.
     """
-    units = _cut_where_wide(pressure, units)
+    units = _cut_where_wide(pressure, units, gaps)
     starts = run_starts(units)
     pieces = np.split(pressure, starts[1:])
     medians = np.array([np.median(piece) for piece in pieces])
@@ -79,7 +93,7 @@ def stroke_levels(pressure: Floats, units: Ints, steady: np.ndarray[tuple[int], 
     counts = steady[starts] & (sizes >= 0.05 * np.median(sizes))
     if not counts.any():
         return static_levels(pressure)
-    label = gap_clusters(medians[counts], STROKE_GAPS, 1.4826 * float(np.median(scatter[counts])))
+    label = gap_clusters(medians[counts], gaps, 1.4826 * float(np.median(scatter[counts])))
     centres = np.array([np.median(medians[counts][label == i]) for i in range(label.max() + 1)])
     own = np.empty(len(starts), dtype=np.int64)
     own[counts] = label
@@ -87,15 +101,15 @@ def stroke_levels(pressure: Floats, units: Ints, steady: np.ndarray[tuple[int], 
     return _moved(pressure, own[units], centres)
 
 
-def _cut_where_wide(pressure: Floats, units: Ints) -> Ints:
+def _cut_where_wide(pressure: Floats, units: Ints, gaps: tuple[float, float]) -> Ints:
     """The strokes, those that go over several levels in pieces."""
     starts = run_starts(units)
     pieces = np.split(pressure, starts[1:])
     spread = np.array([np.ptp(np.quantile(piece, (0.05, 0.95))) for piece in pieces])
-    wide = spread > STROKE_GAPS[1] * np.abs(pressure).max()
+    wide = spread > gaps[1] * np.abs(pressure).max()
     if not wide.any():
         return units
-    parts = gap_clusters(pressure, STROKE_GAPS)
+    parts = gap_clusters(pressure, gaps)
     return run_ids(units, np.where(wide[units], parts, -1))
 
 
@@ -110,15 +124,32 @@ def _moved(pressure: Floats, own: Ints, centres: Floats) -> Ints:
     return np.where(long, near, own)
 
 
-def setpoint_levels(setpoint: Floats) -> Ints:
+def setpoint_levels(setpoint: Floats, displacement: Floats, branch: Ints, units: Ints) -> Ints:
     """Levels (rows,) by setpoints (Pa), from 0 upwards: each value, or what is close to it if read back.
 
-    A setpoint that is commanded stays for many rows; one that is read back has noise.
+    ``branch`` is that of the rough motion, ``units`` numbers its strokes. A setpoint that is commanded stays
+    for many rows, and its values are far apart or change at turns and holds alone; one that is read back has
+    noise, or flickers and drifts while the crosshead moves.
     """
     exact = np.unique(np.round(setpoint, 3), return_inverse=True)[1].astype(np.int64)
-    if len(setpoint) >= STEADY * len(run_starts(run_ids(exact))):
-        return exact
-    return gap_clusters(setpoint, STATIC_GAPS)
+    changed = np.diff(exact, prepend=exact[0]) != 0
+    if len(setpoint) >= STEADY * (np.count_nonzero(changed) + 1):
+        far_apart = gap_clusters(setpoint, STATIC_GAPS).max() == exact.max()
+        on_the_way = changed & _under_way(displacement, branch, units)
+        if far_apart or np.count_nonzero(on_the_way) <= ON_THE_WAY * np.count_nonzero(changed):
+            return exact
+    steady = ~np.isin(branch, [PRESSURISING, DEPRESSURISING])
+    return stroke_levels(setpoint, units, steady, STATIC_GAPS)
+
+
+def _under_way(displacement: Floats, branch: Ints, units: Ints) -> Bools:
+    """Whether the crosshead is between the turns of its stroke (rows,)."""
+    starts = run_starts(units)
+    low = np.minimum.reduceat(displacement, starts)[units]
+    high = np.maximum.reduceat(displacement, starts)[units]
+    share = TURNS * (high - low)
+    between = (displacement > low + share) & (displacement < high - share)
+    return np.asarray(between & np.isin(branch, [LOADING, UNLOADING]))
 
 
 def same_level(pressure: Floats, level: Floats) -> Bools:

@@ -189,13 +189,17 @@ def _levels_and_motion(frames: Sequence[pd.DataFrame], clock: Ints, setpoints: b
     Strokes tell the levels, and a level's own rows tell its strokes: a jump of the crosshead
     between two levels is no stroke. So the motion is looked at twice.
     """
+
+    def column(name: str) -> Floats:
+        return np.concatenate([frame[name].to_numpy() for frame in frames])
+
     rough = _joined([_motion(frame, np.zeros(len(frame), dtype=np.int64)) for frame in frames]).branch
+    units = run_ids(clock, rough)
     if setpoints:
-        level = setpoint_levels(np.concatenate([frame["setpoint_kPa"].to_numpy() for frame in frames]) * KPA)
+        level = setpoint_levels(column("setpoint_kPa") * KPA, column("displacement_mm"), rough, units)
     else:
-        pressure = np.concatenate([frame["pressure_kPa"].to_numpy() for frame in frames]) * KPA
         steady = ~np.isin(rough, [PRESSURISING, DEPRESSURISING])
-        level = stroke_levels(pressure, run_ids(clock, rough), steady)
+        level = stroke_levels(column("pressure_kPa") * KPA, units, steady)
     parts = zip(frames, np.split(level, _ends(frames)), strict=True)
     return level, _joined([_motion(frame, run_ids(part)) for frame, part in parts])
 

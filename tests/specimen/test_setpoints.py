@@ -35,3 +35,39 @@ def test_setpoints_that_read_alike_are_one_level(tmp_path: Path) -> None:
     assert specimen.levels_Pa == pytest.approx([50e3, 100e3])
     note = "loops: 3 setpoints are 2 levels, for some read the same pressure"
     assert note in specimen.notes
+
+
+def test_setpoints_that_are_read_back_and_dwell_make_the_levels_that_there_are(tmp_path: Path) -> None:
+    """Their last digit flickers every second, or drifts for minutes: longer than noise stays."""
+    recording = loops((50.0, 100.0, 150.0), cycles=3, rate=20.0, pressure_sd=0.3)
+    commanded = 50.0 * np.round(recording.pressure / 50.0)
+    rows = np.arange(len(commanded))
+    flicker = 0.1 * np.repeat(np.random.default_rng(1).random(len(rows) // 20 + 1) < 0.5, 20)[: len(rows)]
+    drift = np.round(0.3 * np.sin(rows / 150.0), 1)
+    for name, error in (("flickers", flicker), ("drifts", drift)):
+        specimen = with_setpoints(tmp_path / name, recording, commanded + error)
+        assert specimen.levels_Pa == pytest.approx([50e3, 100e3, 150e3], abs=100.0), name
+        assert specimen.loops is not None
+        assert specimen.loops.cycle.max() == 3, name
+
+
+@pytest.mark.parametrize("dwell", [0, 40])
+def test_setpoints_that_are_commanded_may_lie_close_together(tmp_path: Path, dwell: int) -> None:
+    """They change at turns, or within holds."""
+    recording = loops((300.0, 301.0, 302.0), cycles=1, rate=20.0, dwell=dwell)
+    setpoint = np.roll(recording.pressure, -dwell // 2)
+    setpoint[len(setpoint) - dwell :] = 302.0
+    specimen = with_setpoints(tmp_path, recording, setpoint)
+    assert specimen.levels_Pa == pytest.approx([300e3, 301e3, 302e3])
+
+
+def test_a_ramp_between_two_setpoints_read_back_is_no_level(tmp_path: Path) -> None:
+    recording = loops((50.0, 100.0, 150.0), cycles=2, rate=20.0, dwell=40)
+    flicker = 0.1 * (np.arange(len(recording.time)) // 15 % 2)
+    setpoint = recording.pressure.copy()
+    for change in np.flatnonzero(np.diff(recording.pressure)):
+        setpoint[change - 20 : change + 1] = np.linspace(
+            recording.pressure[change], recording.pressure[change + 1], 21
+        )
+    specimen = with_setpoints(tmp_path, recording, setpoint + flicker)
+    assert specimen.levels_Pa == pytest.approx([50e3, 100e3, 150e3], abs=100.0)
