@@ -25,7 +25,7 @@ STEADY = 10
 TURNS = 0.1
 """Share of a stroke's way, at either end, where a commanded setpoint may change: holds, ramps begun early."""
 ON_THE_WAY = 0.1
-"""Share of all its changes that a commanded setpoint may make between there; one that is read back makes most."""
+"""Share of all its changes that a commanded setpoint may make between them; one read back makes most."""
 LEAST_RUN = 5
 """Fewer rows than this far from their stroke's level are noise, not a change of level."""
 SMALLEST_GAP_PA = 0.3 * KPA

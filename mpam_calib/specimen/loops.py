@@ -54,14 +54,16 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
 
     Raises ``InputError`` for anything in a file that cannot be used.
     """
-    averaged = rows_per_mean(sum(file.estimated_rows for file in files))
+    wanted = rows_per_mean(sum(file.estimated_rows for file in files))
     frames, clocks = [], []
     for file in files:
-        frame, read = _read_file(file, averaged, floor_N)
+        frame, read = _read_file(file, wanted, floor_N)
         _check_plausible(file, frame, geometry)
         frames.append(frame)
         clocks.append(read)
     counts = [read.rows for read in clocks]
+    # Turns, steps and gaps part the groups: where there are many, fewer rows make a mean.
+    averaged = max(1, round(sum(counts) / sum(map(len, frames))))
     clock = np.repeat(np.arange(len(frames)), [len(frame) for frame in frames])
     everywhere = set.intersection(*(set(frame.columns) for frame in frames))
     notes = [

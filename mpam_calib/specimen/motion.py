@@ -38,6 +38,8 @@ FINER = 2.0**0.5
 """Ratio of the numbers of rows, tried one after the other, in which a crosshead gathers its speed."""
 LONG = 4
 """Times the rows of the motion beside it that a sure hold takes (a gentle turn takes about as many)."""
+DROPOUT = 5
+"""Rows within which a leap of the encoder that is undone is a dropout, not a way back."""
 TINY = 1e-12
 """Share of a window's range that passes for an exact fit."""
 NEXT = 2
@@ -324,14 +326,27 @@ def run_starts(runs: Ints) -> Ints:
 
 
 def returns(displacement: Floats, level: Ints, branch: Ints) -> Ints:
-    """How often (rows,) the crosshead has gone back without a reading: strokes of one direction alone."""
+    """How often (rows,) the crosshead has gone back without a reading: strokes of one direction alone.
+
+    It is then at the other end and goes on from there; a dropout of the encoder is undone within a few rows.
+    """
     step = np.diff(displacement, prepend=displacement[0])
     top, bottom = np.full((2, level.max() + 1), -np.inf)
     np.maximum.at(top, level, displacement)
     np.maximum.at(bottom, level, -displacement)
     far = np.abs(step) > 0.5 * (top + bottom)[level]
     same = np.diff(level, prepend=level[0]) == 0
-    return np.cumsum((step * branch > 0.0) & far & same).astype(np.int64)
+    up, down = far & (step > 0.0), far & (step < 0.0)
+    undone = (up & _near(down)) | (down & _near(up))
+    return np.cumsum((step * branch > 0.0) & far & same & ~undone).astype(np.int64)
+
+
+def _near(marked: Bools) -> Bools:
+    """Whether a row is marked within the rows of a dropout on either side (rows,)."""
+    before = np.concatenate([[0], np.cumsum(marked)])
+    rows = np.arange(len(marked))
+    last = np.minimum(rows + DROPOUT + 1, len(marked))
+    return np.asarray(before[last] > before[np.maximum(rows - DROPOUT, 0)])
 
 
 def number_cycles(level: Ints, clock: Ints, branch: Ints, returned: Ints) -> Ints:

@@ -40,3 +40,21 @@ def test_each_is_a_stroke_and_a_cycle_of_its_level(
     assert found.cycle[first[long]].tolist() == [1, 2] * len(LEVELS)
     assert set(found.branch[first[long]].tolist()) == {direction}
     assert draw_blueprint(specimen).speed == pytest.approx(SPEED * 1e-3, rel=0.05)
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_dropout_of_the_displacement_is_no_way_back(tmp_path: Path, direction: int, rows: int) -> None:
+    recording = loops(cycles=3)
+    word = {1: "loading", -1: "unloading"}
+    columns = recording.columns()
+    stroke = np.flatnonzero((recording.branch == direction) & (recording.cycle == 2))
+    columns[stroke[int(0.4 * len(stroke) / 3) :][:rows], 2] = 0.0 if direction == 1 else 7.0
+    columns[stroke[int(0.6 * len(stroke) / 3) :][:rows], 2] = 0.0
+    lines = [f"{HEADER},branch"]
+    for row, branch in zip(columns, recording.branch, strict=True):
+        lines.append(",".join([*(f"{value:.5f}" for value in row), word[int(branch)]]))
+    found = read(make(tmp_path, loops="\n".join(lines) + "\n")).loops
+    assert found is not None
+    assert np.array_equal(found.cycle, recording.cycle)
+    assert len(found.strokes[0]) == 18

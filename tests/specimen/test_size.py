@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from mpam_calib.specimen import read, reduction
+from mpam_calib.specimen.summary import summarise_loops
 
 from .folders import DECLARATION, HEADER, Recording, loops, make
 
@@ -115,3 +116,37 @@ def test_small_blocks_report_the_right_row(tmp_path: Path, monkeypatch: pytest.M
     lines[2345] = "1,2,x,4"
     with pytest.raises(Exception, match=r"loops.csv:2346:displacement_mm: "):
         read(make(tmp_path, loops="\n".join(lines)))
+
+
+@pytest.mark.usefixtures("few_rows_kept")
+def test_averages_do_not_stop_at_the_noise_of_a_setpoint_read_back(tmp_path: Path) -> None:
+    recording = noisy()
+    rng = np.random.default_rng(2)
+    force_sd = 0.25
+    commanded = 50.0 * np.round(recording.pressure / 50.0)
+    columns = recording.columns()
+    columns[:, 3] += force_sd * rng.standard_normal(len(commanded))
+    setpoint = commanded + np.round(0.2 * rng.standard_normal(len(commanded)), 2)
+    rows = [",".join(f"{value:.5f}" for value in row) for row in np.column_stack([columns, setpoint])]
+    specimen = read(make(tmp_path, loops="\n".join([f"{HEADER},setpoint_kPa", *rows])))
+    found = specimen.loops
+    assert found is not None and found.averaged > 2
+    assert len(found.time_s) * found.averaged == pytest.approx(len(commanded), rel=0.2)
+    assert specimen.levels_Pa / 1e3 == pytest.approx([50.0, 150.0], abs=0.2)
+    assert found.stroke[-1] + 1 == 12
+    told = summarise_loops(found, specimen.levels_Pa, 0.05)
+    assert told.sampling_Hz == pytest.approx([100.0], rel=0.1)
+    assert told.noise_N == pytest.approx(force_sd, rel=0.1)
+
+
+@pytest.mark.usefixtures("few_rows_kept")
+def test_rows_that_were_not_averaged_are_not_said_to_be(tmp_path: Path) -> None:
+    """Cycles of three rows: no mean spans two of them."""
+    recording = noisy()
+    cycle = np.arange(len(recording.time)) // 3 + 1
+    body = recording.text().splitlines()
+    rows = [f"{row},{number}" for row, number in zip(body[1:], cycle, strict=True)]
+    specimen = read(make(tmp_path, loops="\n".join([f"{HEADER},cycle", *rows])))
+    found = specimen.loops
+    assert found is not None
+    assert len(found.time_s) * found.averaged == pytest.approx(len(cycle), rel=0.2)
