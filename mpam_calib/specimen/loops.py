@@ -10,15 +10,13 @@ import numpy as np
 import pandas as pd
 
 from mpam_calib.specimen.clock import Clock
+from mpam_calib.specimen.cycles import cycles_at_turns, number_cycles, returns
 from mpam_calib.specimen.declaration import Geometry
 from mpam_calib.specimen.levels import setpoint_levels, setpoint_notes, sorted_levels, stroke_levels
 from mpam_calib.specimen.motion import (
     Motion,
-    cycles_at_turns,
     noise_sd,
-    number_cycles,
     read_motion,
-    returns,
     run_ids,
     run_starts,
     turn_threshold,

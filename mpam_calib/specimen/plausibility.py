@@ -10,7 +10,7 @@ import pandas as pd
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import FileKind, Geometry
 from mpam_calib.specimen.motion import RANGE_SHARE, turn_threshold, turning_points
-from mpam_calib.specimen.recording import Floats, Ints
+from mpam_calib.specimen.recording import Bools, Floats, Ints
 from mpam_calib.units import ATMOSPHERE, KPA, MM
 
 HIGHEST_LEVEL_KPA = 5000.0
@@ -26,6 +26,10 @@ MOST = {
     "setpoint_kPa": 1e9, "cycle": 1e9, "time_s": 1e15, "temperature_C": 1e3,
 }  # fmt: skip
 """Sizes of readings, in the files' units, that no rig for such muscles reads."""
+CODE_TIMES = 10.0
+"""Times what nearly all of a column's values stay below, from which nines alone are a code (if above all)."""
+USUAL = 0.99
+"""Share of a column's values that stay below what is usual."""
 AGAINST = 0.8
 """Share of all motion against its branch's direction from which the words are taken for swapped."""
 
@@ -89,10 +93,32 @@ def check_codes(label: str, frame: pd.DataFrame) -> None:
     for name, most in MOST.items():
         if name in frame:
             values = frame[name].to_numpy()
-            far = np.flatnonzero(np.abs(values) > most)
+            far, limit = np.flatnonzero(np.abs(values) > most), most
+            if not len(far):
+                far, limit = lone_nines(values)
             if len(far):
                 found = f"{values[far[0]]:g} (a code for no reading?)"
-                raise InputError(label, found, f"at most {most:g}", int(frame.index[far[0]]), name)
+                raise InputError(label, found, f"at most {limit:g}", int(frame.index[far[0]]), name)
+
+
+def lone_nines(values: Floats) -> tuple[Ints, float]:
+    """Places (n,) of nines alone, such as -9999, that are far from all the rest, and where far begins."""
+    coded = nines(values)
+    if not coded.any() or coded.all():
+        return np.zeros(0, dtype=np.int64), np.inf
+    rest = np.abs(values[~coded])
+    limit = max(CODE_TIMES * float(np.quantile(rest, USUAL)), float(rest.max()))
+    return np.flatnonzero(coded & (np.abs(values) > limit)), limit
+
+
+def nines(values: Floats) -> Bools:
+    """Whether values (n,) are written as three nines or more and nothing else, whatever the unit."""
+    size = np.abs(values)
+    size = np.where(size > 1e-300, size, 1.0)
+    rest = 10.0 - size / 10.0 ** np.floor(np.log10(size))
+    places = np.log10(np.maximum(rest, 1e-15))
+    whole = np.round(places)
+    return np.asarray((whole <= -2.0) & (np.abs(places - whole) < 1e-4))
 
 
 def check_strain(label: str, strain: Floats, rows: Ints) -> None:
@@ -160,14 +186,20 @@ def longest_contraction(geometry: Geometry) -> float:
 def check_contraction(
     label: str, contraction: Floats, rows: Ints, geometry: Geometry, kind: FileKind, column: str
 ) -> None:
-    """Refuse a muscle shorter than nothing, or one that is mostly longer than its straight strands."""
+    """Refuse a muscle shorter than nothing, or one that is mostly (or once far) longer than its straight
+    strands."""
     unit, factor = (" mm", geometry.L0_mm) if column == "displacement_mm" else ("", 1.0)
     short = np.flatnonzero(contraction >= 1.0)
     if len(short):
         found = f"{contraction[short[0]] * factor:.4g}{unit}"
         expected = f"a shortening below L0 = {geometry.L0_mm:g} mm (not a length)"
         raise InputError(label, found, expected, int(rows[short[0]]), column)
+    long = np.flatnonzero(contraction <= longest_contraction(geometry) - 1.0)
     median = float(np.median(contraction))
+    if len(long) and median > longest_contraction(geometry):
+        found = f"{contraction[long[0]] * factor:.4g}{unit}, longer than the strands by more than L0"
+        expected = f"a shortening from L0 = {geometry.L0_mm:g} mm"
+        raise InputError(label, found, expected, int(rows[long[0]]), column)
     if median <= longest_contraction(geometry):
         found = f"a median of {median * factor:.4g}{unit}, longer than the strands (flipped sign?)"
         expected = f"contraction above 0; {map_hint(kind, column, '-1.0')}"

@@ -7,6 +7,7 @@ import pandas as pd
 
 from mpam_calib.specimen.levels import SMALLEST_GAP_PA, STATIC_GAPS, STEADY
 from mpam_calib.specimen.motion import noise_sd, read_motion, turn_threshold
+from mpam_calib.specimen.plausibility import MOST, lone_nines
 from mpam_calib.specimen.recording import Bools, Floats
 from mpam_calib.units import KPA
 
@@ -60,6 +61,10 @@ def _cuts(frame: pd.DataFrame, labels: list[str]) -> Bools:
     """Whether a group must begin at each row."""
     cuts = np.zeros(len(frame), dtype=bool)
     cuts[0] = True
+    for name in MOST.keys() & frame.columns:
+        codes, _ = lone_nines(frame[name].to_numpy())  # a mean would hide them
+        cuts[codes] = True
+        cuts[np.minimum(codes + 1, len(cuts) - 1)] = True
     for name in labels:
         cuts[1:] |= np.diff(frame[name].to_numpy()) != 0
     if _SETPOINT in frame:

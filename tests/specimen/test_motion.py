@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mpam_calib.specimen.cycles import cycles_at_turns, number_cycles
 from mpam_calib.specimen.motion import (
-    cycles_at_turns,
     noise_sd,
-    number_cycles,
     read_motion,
     run_ids,
     turn_threshold,

@@ -102,6 +102,46 @@ def test_such_a_code_in_a_column_beside_them(name: str, tmp_path: Path) -> None:
     assert message.startswith(f"loops.csv:22:{name}: found 9.9e+37 (a code for no reading?)")
 
 
+@pytest.mark.parametrize("code", [-9999.0, 99999.0, -9999.9])
+@pytest.mark.parametrize("column", range(1, 4))
+def test_nines_alone_far_from_all_the_rest_are_a_code(column: int, code: float, tmp_path: Path) -> None:
+    columns = loops(rate=20.0).columns()
+    columns[120, column] = code
+    message = refused(make(tmp_path, loops=table(columns)))
+    assert message.startswith(f"loops.csv:122:{HEADER.split(',')[column]}: found {code:g} (a code for no rea")
+
+
+def test_nines_alone_in_a_setpoint_and_in_rows_that_are_averaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = loops(rate=20.0)
+    header, *rows = recording.text().splitlines()
+    beside = ["-99999" if i == 20 else f"{p:g}" for i, p in enumerate(recording.pressure)]
+    lines = [f"{header},setpoint_kPa", *(f"{row},{cell}" for row, cell in zip(rows, beside, strict=True))]
+    message = refused(make(tmp_path / "setpoint", loops="\n".join(lines) + "\n"))
+    assert message.startswith("loops.csv:22:setpoint_kPa: found -99999 (a code for no reading?)")
+    monkeypatch.setattr("mpam_calib.specimen.reduction.ROWS_KEPT", 150)
+    columns = recording.columns()
+    columns[120, 3] = -9999.0
+    message = refused(make(tmp_path / "averaged", loops=table(columns)))
+    assert message.startswith("loops.csv:122:force_N: found -9999 (a code for no reading?)")
+
+
+def test_nines_among_their_like_are_readings(tmp_path: Path) -> None:
+    columns = loops().columns()
+    columns[30, 3] = 9.99
+    columns[columns[:, 1] == 100.0, 1] = 99.9
+    made = read(make(tmp_path, loops=table(columns)))
+    assert made.levels_Pa[1] == 99.9e3
+
+
+def test_a_muscle_drawn_far_beyond_its_strands_is_refused_where_it_is(tmp_path: Path) -> None:
+    columns = loops().columns()
+    columns[30, 2] = -321.0
+    message = refused(make(tmp_path, loops=table(columns)))
+    assert message.startswith("loops.csv:32:displacement_mm: found -321 mm, longer than the strands by more")
+
+
 def test_such_a_code_in_a_force_map_and_a_tensile_test(tmp_path: Path) -> None:
     rows = "".join(f"{P},{g},{P / 5}\n" for P in (50, 100) for g in (0.0, 0.05, 0.1))
     text = f"pressure_kPa,contraction,force_N\n{rows}100,0.12,9.9e37\n"
