@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
 from mpam_calib.model.model import Model
 from mpam_calib.posterior.checkpoint import Checkpoint
@@ -21,7 +22,13 @@ from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Sampling, sample
 from mpam_calib.posterior.summary import all_converged, summarise
 from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.bands import muscle_bands, stress_bands
-from mpam_calib.specimen.arguments import demand_number, demand_specimen, demand_whole
+from mpam_calib.specimen.arguments import (
+    demand_number,
+    demand_optional,
+    demand_pressures,
+    demand_specimen,
+    demand_whole,
+)
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import KPA
 
@@ -60,7 +67,14 @@ class Calibration:
         return all_converged(self.summary, self.sampling, self.ess_wanted)
 
     def bands(self, pressures_kPa: Array | list[float] | None = None) -> pd.DataFrame:
-        """Credible bands at pressures (kPa; the specimen's levels by default), as in ``bands.csv``."""
+        """Credible bands at pressures (kPa; the specimen's levels by default), as in ``bands.csv``.
+
+        Raises ``InputError`` for what is no list of pressures.
+        """
+        if pressures_kPa is not None:
+            pressures_kPa = demand_pressures("pressures_kPa", pressures_kPa)
+            if self.model.chain is None:
+                raise InputError("pressures_kPa", "pressures", "none for a material without a muscle")
         return predict(self.model, self.draws, self.seed, pressures_kPa)
 
 
@@ -103,6 +117,8 @@ def calibrate(
     demand_whole("--seed", seed, 0)
     demand_whole("--max-steps", max_steps, 1)
     demand_number("--ess", ess_wanted, 1.0)
+    demand_optional("options", options, Options)
+    demand_optional("material", material, MaterialPosterior)
     if material is None:
         material = material_of(specimen)
     target = build_target(specimen, draw_blueprint(specimen, options, material))

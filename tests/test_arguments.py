@@ -26,6 +26,8 @@ CALIBRATE: dict[str, tuple[dict[str, Any], str]] = {
     "no steps": ({"max_steps": 0}, "--max-steps: found 0, expected a whole number from 1 upwards"),
     "no draws": ({"ess_wanted": 0.0}, "--ess: found 0.0, expected a number from 1 upwards"),
     "draws without end": ({"ess_wanted": float("inf")}, "--ess: found inf, expected a number"),
+    "options in a number": ({"options": 5}, "options: found 5, expected Options or None"),
+    "a material in words": ({"material": "x"}, "material: found str 'x', expected MaterialPosterior or None"),
     "not a number of draws": ({"ess_wanted": float("nan")}, "--ess: found nan, expected a number"),
 }
 
@@ -60,6 +62,32 @@ def test_an_option_of_simulate_that_means_nothing(
     with pytest.raises(mc.InputError) as error:
         mc.simulate(rubber, **options)
     assert str(error.value).startswith(said)
+
+
+@pytest.mark.parametrize("given", [None, 5, b"x", ["x"], "a\0b"])
+def test_what_is_no_path(given: Any) -> None:
+    with pytest.raises(mc.InputError, match=r"SPECIMEN: found .*, expected the path of a specimen's folder"):
+        mc.read(given)
+
+
+@pytest.fixture(scope="module")
+def pressures() -> Callable[[Any], object]:
+    """A muscle's bands, as far as its pressures are looked at."""
+
+    class Muscle:
+        chain = object()
+
+    found = object.__new__(mc.Calibration)
+    vars(found)["target"] = type("Target", (), {"model": Muscle()})()
+    return found.bands
+
+
+@pytest.mark.parametrize(
+    "given", [[], 5, ["x"], [[100.0, 200.0]], [[1.0], [1.0, 2.0]], [float("nan")], [-5.0], [1e4], [None], "x"]
+)
+def test_what_are_no_pressures_for_bands(given: Any, pressures: Callable[[Any], object]) -> None:
+    with pytest.raises(mc.InputError, match=r"pressures_kPa: found .*, expected a list of pressures in kPa"):
+        pressures(given)
 
 
 def test_numpy_s_numbers_are_numbers(rubber: mc.Specimen) -> None:

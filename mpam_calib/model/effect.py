@@ -7,6 +7,7 @@ them; nothing else in the package knows any effect by name.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
@@ -15,7 +16,8 @@ from importlib import import_module
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.model.bend import FORM, bend_factor, bend_parameters
+from mpam_calib.errors import InputError
+from mpam_calib.model.bend import DRIVERS, FORM, bend_factor, bend_parameters
 from mpam_calib.model.priors import Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.specimen.effect_ids import add_effect_id, load_outside_effects
@@ -106,16 +108,49 @@ class Effect:
 
 
 _REGISTRY: dict[str, Effect] = {}
+_ID = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+
+
+class NoEffect(InputError, ValueError):
+    """What cannot be registered as an effect, and why."""
 
 
 def register(effect: Effect) -> Effect:
-    """Make an effect known under its id, to specimen files too; raises ValueError where the id is taken."""
+    """Make an effect known under its id, to specimen files too.
+
+    Raises ``InputError`` (a ``ValueError`` as well) where the id is taken, and for what cannot be one.
+    """
+    _demand_effect(effect)
     if effect.id in _REGISTRY:
-        raise ValueError(f"an effect with the id {effect.id!r} is registered already")
+        found = f"the id {effect.id!r}, which is registered already"
+        raise NoEffect("register", found, "an id of its own", None, "id")
     _REGISTRY[effect.id] = effect
     if not effect.fault:
         add_effect_id(effect.id, effect.all_forms)
     return effect
+
+
+def _demand_effect(given: object) -> None:
+    """Raise ``NoEffect`` for what would fail later, in a specimen file or inside a fit."""
+
+    def demand(holds: bool, column: str, found: object, expected: str) -> None:
+        if not holds:
+            raise NoEffect("register", repr(found)[:60], expected, None, column)
+
+    if not isinstance(given, Effect):
+        raise NoEffect("register", repr(given)[:60], "an Effect")
+    words = "a word of letters, digits and underscores, as specimen files write it"
+    for name in (given.id, *given.forms):
+        named = isinstance(name, str) and _ID.fullmatch(name) is not None
+        demand(named, "id" if name == given.id else "forms", name, words)
+    demand(isinstance(given.stage, Stage), "stage", given.stage, "a Stage, such as Stage.SENSOR")
+    functions = {"parameters": given.parameters, "apply": given.apply, **given.forms, **given.own}
+    for name, function in functions.items():
+        demand(callable(function), name, function, "a function")
+    for driver, degree in given.bends.items():
+        demand(driver in DRIVERS, "bends", driver, f"one of {', '.join(DRIVERS)}")
+        whole = isinstance(degree, int) and not isinstance(degree, bool) and degree > 0
+        demand(whole, "bends", degree, "a whole number from 1 upwards")
 
 
 def effect(identifier: str) -> Effect:

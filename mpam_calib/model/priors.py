@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
+from mpam_calib.errors import InputError
+from mpam_calib.specimen.arguments import demand_finite
 from mpam_calib.units import unit_of
 
 Array = NDArray[np.float64]
@@ -47,12 +49,22 @@ class Prior(Protocol):
         """The same prior, ``factor`` times as wide (below 1: narrower); physical bounds stay."""
 
 
+def _demand_order(prior: str, low: float, high: float) -> None:
+    """Raise ``InputError`` unless a prior's upper bound is above its lower one."""
+    if not low < high:
+        raise InputError(prior, f"low = {low!r} and high = {high!r}", "low below high")
+
+
 @dataclass(frozen=True)
 class Normal:
     """N(mean, sd²)."""
 
     mean: float
     scale: float
+
+    def __post_init__(self) -> None:
+        demand_finite("Normal", "mean", self.mean)
+        demand_finite("Normal", "scale", self.scale, above=0.0)
 
     def from_normal(self, u: Array) -> Array:
         """mean + scale·u."""
@@ -85,6 +97,9 @@ class LongTailed:
     """
 
     scale: float
+
+    def __post_init__(self) -> None:
+        demand_finite("LongTailed", "scale", self.scale, above=0.0)
 
     def from_normal(self, u: Array) -> Array:
         """scale·δ·sinh(arsinh(u)/δ)."""
@@ -123,6 +138,11 @@ class NormalWithin:
     scale: float
     low: float
     high: float
+
+    def __post_init__(self) -> None:
+        demand_finite("NormalWithin", "mean", self.mean)
+        demand_finite("NormalWithin", "scale", self.scale, above=0.0)
+        _demand_order("NormalWithin", self.low, self.high)
 
     @property
     def _shares(self) -> tuple[float, float]:
@@ -166,6 +186,11 @@ class LogNormal:
     log_sd: float
     least: float = 0.0
 
+    def __post_init__(self) -> None:
+        demand_finite("LogNormal", "median", self.median, above=0.0)
+        demand_finite("LogNormal", "log_sd", self.log_sd, above=0.0)
+        demand_finite("LogNormal", "least", self.least)
+
     def from_normal(self, u: Array) -> Array:
         """least + median·exp(log_sd·u)."""
         return self.least + self.median * np.exp(self.log_sd * np.clip(u, -40.0, 40.0))
@@ -196,6 +221,9 @@ class HalfNormal:
 
     scale: float
 
+    def __post_init__(self) -> None:
+        demand_finite("HalfNormal", "scale", self.scale, above=0.0)
+
     def from_normal(self, u: Array) -> Array:
         """The value with the same upper-tail probability (accurate in both tails)."""
         return -self.scale * special.ndtri(special.ndtr(-np.clip(u, -_FAR, 37.0)) / 2.0)
@@ -223,6 +251,9 @@ class HalfLongTailed:
     """|LongTailed(scale)|: a size with one sign, of which nobody knows how large it can be."""
 
     scale: float
+
+    def __post_init__(self) -> None:
+        demand_finite("HalfLongTailed", "scale", self.scale, above=0.0)
 
     def from_normal(self, u: Array) -> Array:
         """The half-normal's value, its tail drawn out as :class:`LongTailed` does."""
@@ -258,6 +289,11 @@ class Uniform:
     low: float
     high: float
 
+    def __post_init__(self) -> None:
+        demand_finite("Uniform", "low", self.low)
+        demand_finite("Uniform", "high", self.high)
+        _demand_order("Uniform", self.low, self.high)
+
     def from_normal(self, u: Array) -> Array:
         """low + (high − low)·Φ(u)."""
         return self.low + (self.high - self.low) * special.ndtr(np.clip(u, -_FAR, _FAR))
@@ -286,6 +322,11 @@ class LogUniform:
 
     low: float
     high: float
+
+    def __post_init__(self) -> None:
+        demand_finite("LogUniform", "low", self.low, above=0.0)
+        demand_finite("LogUniform", "high", self.high)
+        _demand_order("LogUniform", self.low, self.high)
 
     @property
     def _log(self) -> Uniform:
@@ -326,6 +367,11 @@ class Parameter:
     source: str = ""
     unit: str | None = None
     """Printed unit where the name does not carry it."""
+
+    def __post_init__(self) -> None:
+        if not callable(getattr(self.prior, "from_normal", None)):
+            found = f"{type(self.prior).__name__} {self.prior!r}"
+            raise InputError("Parameter", found, "a prior, such as Normal(0.0, 1.0)", None, self.name)
 
     @property
     def printed_unit(self) -> str:

@@ -44,7 +44,7 @@ def outside() -> Iterator[Effect]:
             source="a test",
             parameters=_parameters,
             apply=_apply,
-            bends={"swing_N": 1},
+            bends={"time": 1},
         )
     )
     yield made
@@ -65,6 +65,28 @@ def test_an_id_can_be_taken_only_once(outside):
         register(outside)
     effect_ids.add_effect_id(IDENTIFIER)
     assert effect_ids.known_effect_ids().count(IDENTIFIER) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"id": ""}, "register:id: found ''"),
+        ({"id": "a:b"}, "register:id: found 'a:b'"),
+        ({"id": "has space"}, "register:id: found 'has space'"),
+        ({"id": "other", "stage": "sensor"}, "register:stage: found 'sensor', expected a Stage"),
+        ({"id": "other", "apply": None}, "register:apply: found None, expected a function"),
+        ({"id": "other", "parameters": ()}, "register:parameters: found (), expected a function"),
+        ({"id": "other", "bends": {"swing_N": 1}}, "register:bends: found 'swing_N', expected one of contr"),
+        ({"id": "other", "bends": {"time": 0}}, "register:bends: found 0, expected a whole number"),
+        ({"id": "other", "forms": {"a b": _apply}}, "register:forms: found 'a b'"),
+    ],
+)
+def test_what_cannot_be_an_effect_is_not_registered(outside, changes, said):
+    with pytest.raises(InputError) as error:
+        register(replace(outside, **changes))
+    assert str(error.value).startswith(said)
+    assert isinstance(error.value, ValueError)
+    assert known_effects()[-1] == IDENTIFIER
 
 
 @pytest.mark.parametrize(("form", "refused"), [("bent", False), ("soft", True)])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import integrate, special, stats
 
+from mpam_calib.errors import InputError
 from mpam_calib.model.model import build_model
 from mpam_calib.model.priors import (
     TAIL,
@@ -16,6 +17,7 @@ from mpam_calib.model.priors import (
     LongTailed,
     Normal,
     NormalWithin,
+    Parameter,
     Uniform,
 )
 
@@ -150,3 +152,27 @@ def test_widened_priors():
 def test_a_factor_of_one_changes_nothing(prior, named):
     u = np.linspace(-3.0, 3.0, 13)
     assert prior.widened(1.0).from_normal(u) == pytest.approx(prior.from_normal(u), rel=1e-12)
+
+
+WRONG = {
+    "Normal:scale: found -1.0": lambda: Normal(0.0, -1.0),
+    "Normal:mean: found nan": lambda: Normal(np.nan, 1.0),
+    "Normal:scale: found str": lambda: Normal(0.0, "1"),
+    "LongTailed:scale: found 0.0": lambda: LongTailed(0.0),
+    "HalfNormal:scale: found 0": lambda: HalfNormal(0),
+    "HalfLongTailed:scale: found inf": lambda: HalfLongTailed(np.inf),
+    "LogNormal:median: found 0.0": lambda: LogNormal(0.0, 0.5),
+    "LogNormal:log_sd: found -0.5": lambda: LogNormal(1.0, -0.5),
+    "LogUniform:low: found 0.0": lambda: LogUniform(0.0, 1.0),
+    "LogUniform: found low = 2.0 and high = 1.0": lambda: LogUniform(2.0, 1.0),
+    "Uniform: found low = 2.0 and high = 1.0": lambda: Uniform(2.0, 1.0),
+    "NormalWithin: found low = 1.0 and high = 1.0": lambda: NormalWithin(0.0, 1.0, 1.0, 1.0),
+    "Parameter:size_N: found int 5": lambda: Parameter("size_N", 5, "a size"),
+}
+
+
+@pytest.mark.parametrize("said", WRONG)
+def test_what_is_no_prior_is_refused_where_it_is_made(said):
+    with pytest.raises(InputError) as error:
+        WRONG[said]()
+    assert str(error.value).startswith(said)
