@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mpam_calib.errors import InputError
+from mpam_calib.specimen.misread import COMPARED, cut_off
 from mpam_calib.specimen.recording import BRANCH_WORDS
 from mpam_calib.specimen.tables import GAPPED_COLUMNS, TEXT_COLUMNS, TableSpec
 from mpam_calib.specimen.text_format import TextFormat, is_number, refuse_other_than_text
@@ -29,6 +30,8 @@ class _Lines:
 
     raw: bytes
     rows: NDArray[np.int64]
+    open_end: bool = False
+    """Whether it is the file's last row, without an end of its own."""
 
 
 def read_blocks(path: Path, label: str, spec: TableSpec, form: TextFormat) -> Iterator[pd.DataFrame]:
@@ -39,8 +42,12 @@ def read_blocks(path: Path, label: str, spec: TableSpec, form: TextFormat) -> It
     first row or cell that cannot be used, and for a file with a header only.
     """
     any_row = False
+    above: list[bytes] = []
     for lines in _row_blocks(path, label, form):
         _check_row_lengths(label, lines, form)
+        if lines.open_end:
+            _refuse_cut_off(label, lines, above, form)
+        above = lines.raw.split(b"\n")[-COMPARED - 1 : -1]
         frame, form = _parse(label, lines, form)
         for field in form.fields:
             if field.name not in TEXT_COLUMNS and (field.scale, field.offset) != (1.0, 0.0):
@@ -75,7 +82,7 @@ def _row_blocks(path: Path, label: str, form: TextFormat) -> Iterator[_Lines]:
             lines = _without_blank_rows(raw, row, form.rows_above - row, form)
             row += count
             if len(lines.rows):
-                yield lines
+                yield replace(lines, open_end=not piece)
             if not piece:
                 return
 
@@ -103,6 +110,19 @@ def _without_blank_rows(raw: bytes, before: int, skip: int, form: TextFormat) ->
             raw = b"".join(line + b"\n" for line, whole in zip(kept, full, strict=True) if whole)
             rows = rows[full]
     return _Lines(raw, rows)
+
+
+def _refuse_cut_off(label: str, lines: _Lines, above: list[bytes], form: TextFormat) -> None:
+    """Refuse a last row whose last cell is shorter than it should be, where that is a column that is read."""
+    last = [field for field in form.fields if field.position == form.cells - 1]
+    mark = form.delimiter.encode()
+    cell, *cells = (
+        row.rpartition(mark)[2].strip(b' \t\r"').decode(form.encoding, "replace")
+        for row in [lines.raw.rstrip(b"\n"), *above]
+    )
+    if last and last[0].name not in TEXT_COLUMNS and cut_off(cells, cell):
+        found = f"{quoted(cell)} at the file's end, shorter than the cells above it (cut off?)"
+        raise InputError(label, found, "a whole row", int(lines.rows[-1]), last[0].name)
 
 
 def _check_row_lengths(label: str, lines: _Lines, form: TextFormat) -> None:
@@ -213,6 +233,9 @@ def _bad_cell(label: str, row: int, name: str, cell: str, form: TextFormat) -> I
     other = "," if form.decimal == "." else "."
     if not cell.strip():
         return InputError(label, "an empty cell", "a number", row, name)
+    if cell.strip() == name:
+        expected = "a number (a list in [files] where a logger was started anew)"
+        return InputError(label, f"{quoted(cell)}, the header again", expected, row, name)
     if is_number(cell, other):
         expected = f'a number with the decimal mark "{form.decimal}" of the rest (mixed decimal marks)'
         return InputError(label, quoted(cell), expected, row, name)

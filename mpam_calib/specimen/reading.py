@@ -96,7 +96,11 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
         free_contraction=free,
         tensile=tensile,
         digest=_digest(source, declaration, files),
-        notes=(*(loops.notes if loops else ()), *unused(source, declaration, simulation)),
+        notes=(
+            *(loops.notes if loops else ()),
+            *_overlooked(files),
+            *unused(source, declaration, simulation),
+        ),
         files=tuple(
             FileRead(file.kind, file.name, count, file.form.delimiter, file.form.decimal)
             for kind, counts in rows.items()
@@ -104,6 +108,15 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
         ),
         noise=declaration.noise,
     )
+
+
+def _overlooked(files: list[DataFile]) -> list[str]:
+    """A remark for each column that would be read, were it called otherwise (once for all files alike)."""
+    found = {(file.kind, written, name): None for file in files for written, name in file.form.overlooked}
+    return [
+        f'{kind}: the column "{written}" is not read; {name} = "{written}" in [columns.{kind}] would do'
+        for kind, written, name in found
+    ]
 
 
 def _common_levels(

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import Column, Csv
+from mpam_calib.specimen.misread import refuse_thousands
 from mpam_calib.specimen.tables import TEXT_COLUMNS, TableSpec
 from mpam_calib.specimen.units_row import is_units_row
 from mpam_calib.specimen.wording import did_you_mean, listed, os_reason, quoted
@@ -52,6 +53,8 @@ class TextFormat:
     cells: int
     fields: tuple[Field, ...]
     bytes_per_row: float
+    overlooked: tuple[tuple[str, str], ...] = ()
+    """Columns that are not read, and the optional ones that they are but for their spelling."""
 
 
 def detect_format(
@@ -87,8 +90,14 @@ def detect_format(
         below = lines.index(body[0], above) + 1
         if is_units_row(label, below, _split(body[0], delimiter), fields):
             above, body = below, body[1:]
-    numbers = [field.position for field in fields if field.name not in TEXT_COLUMNS]
-    mark = declared.decimal or _decimal(body, delimiter, numbers)
+    numbers = [field for field in fields if field.name not in TEXT_COLUMNS]
+    mark = declared.decimal or _decimal(body, delimiter, [field.position for field in numbers])
+    parted = [(below, _split(line, delimiter)) for below, line in enumerate(lines[above:], above + 1)]
+    for field in numbers:
+        place = field.position
+        refuse_thousands(
+            label, field.name, [(below, cells[place]) for below, cells in parted if place < len(cells)]
+        )
     width = sum(map(len, body)) / len(body) + 1.0 if body else 1.0
     return TextFormat(
         encoding,
@@ -100,6 +109,7 @@ def detect_format(
         len(header),
         fields,
         width,
+        _overlooked(header, spec, wanted),
     )
 
 
@@ -193,6 +203,19 @@ def _fields(
         column = mapping.get(name, Column())
         fields.append(Field(name, header.index(written), column.scale, column.offset))
     return tuple(fields)
+
+
+def _overlooked(
+    header: Sequence[str], spec: TableSpec, wanted: dict[str, str]
+) -> tuple[tuple[str, str], ...]:
+    """Columns of the header that are optional ones written otherwise (``Branch``), with these."""
+
+    def plain(name: str) -> str:
+        return re.sub(r"[\W_]", "", name).lower()
+
+    missed = {plain(name): name for name in spec.optional if wanted[name] == name and name not in header}
+    read = set(wanted.values())
+    return tuple((cell, missed[plain(cell)]) for cell in header if plain(cell) in missed and cell not in read)
 
 
 def _decimal(body: Sequence[str], delimiter: str, positions: Sequence[int]) -> str | None:

@@ -154,3 +154,52 @@ def test_numbers_survive_both_decimal_marks(
     form = detect_format(file, "f", spec, Csv(), {})
     found = [value for block in read_blocks(file, "f", spec, form) for value in block["force_N"]]
     assert found == pytest.approx(values, rel=1e-14)
+
+
+def test_a_last_cell_that_is_cut_off_is_refused(tmp_path: Path) -> None:
+    """A logger that lost its power: 1 for 14.25000 is a number, too."""
+    last = len(PLAIN.splitlines())
+    exponents = "\n".join([HEADER, *(",".join(f"{v:.5E}" for v in row) for row in loops().columns())])
+    for name, text in (("digits", PLAIN[:-4]), ("all digits", PLAIN[:-8]), ("exponent", exponents[:-1])):
+        with pytest.raises(InputError, match=rf"loops.csv:{last}:force_N: found .* \(cut off\?\), expected"):
+            read(make(tmp_path / name, loops=text))
+
+
+def test_a_last_cell_that_is_merely_short_is_read(tmp_path: Path) -> None:
+    """Numbers without zeros at their end, of which the last is whole."""
+    columns = loops().columns()
+    columns[:, 3] = 22.1
+    columns[0, 3], columns[-1, 3] = 22.25, 22.0
+    text = "\n".join([HEADER, *(",".join(f"{value:.6g}" for value in row) for row in columns)])
+    found = read(make(tmp_path, loops=text)).loops
+    assert found is not None and found.force_N[-1] == 22.0
+
+
+@pytest.mark.parametrize("separator", [".", ","])
+def test_thousands_that_are_parted_are_refused(separator: str, tmp_path: Path) -> None:
+    """Whole numbers alone show no decimal mark that would contradict."""
+    lines = [HEADER.replace(",", ";")]
+    for row in loops().columns():
+        force = f"{row[3] * 30.0:,.0f}".replace(",", separator)
+        lines.append(f"{row[0] * 10.0:.0f};{row[1]:.0f};{row[2]:.0f};{force}")
+    first = next(i for i, line in enumerate(lines[1:], start=2) if separator in line)
+    with pytest.raises(InputError, match=rf"loops.csv:{first}:force_N: found .* \(a thousands separator\?\)"):
+        read(make(tmp_path, loops="\n".join(lines) + "\n"))
+
+
+def test_a_column_that_is_not_read_for_its_spelling_is_said(tmp_path: Path) -> None:
+    recording = loops()
+    setpoint = [f"{value:g}" for value in recording.pressure]
+    body = PLAIN.splitlines()
+    rows = [f"{row},{cell},x" for row, cell in zip(body[1:], setpoint, strict=True)]
+    specimen = read(make(tmp_path, loops="\n".join([f"{body[0]},Setpoint_kPa,Note", *rows]) + "\n"))
+    said = [note for note in specimen.notes if "is not read" in note]
+    mapped = 'setpoint_kPa = "Setpoint_kPa" in [columns.loops]'
+    assert said == [f'loops: the column "Setpoint_kPa" is not read; {mapped} would do']
+
+
+def test_a_second_header_is_refused_as_such(tmp_path: Path) -> None:
+    lines = PLAIN.splitlines()
+    text = "\n".join([*lines[:100], lines[0], *lines[100:]]) + "\n"
+    with pytest.raises(InputError, match=r'loops.csv:101:time_s: found "time_s", the header again, expected'):
+        read(make(tmp_path, loops=text))
