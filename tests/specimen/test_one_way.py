@@ -48,9 +48,11 @@ def test_a_dropout_of_the_displacement_is_no_way_back(tmp_path: Path, direction:
     recording = loops(cycles=3)
     word = {1: "loading", -1: "unloading"}
     columns = recording.columns()
-    stroke = np.flatnonzero((recording.branch == direction) & (recording.cycle == 2))
-    columns[stroke[int(0.4 * len(stroke) / 3) :][:rows], 2] = 0.0 if direction == 1 else 7.0
-    columns[stroke[int(0.6 * len(stroke) / 3) :][:rows], 2] = 0.0
+    one = (recording.branch == direction) & (recording.cycle == 2) & (recording.pressure == 50.0)
+    stroke = np.flatnonzero(one)
+    far_out, far_in = (int(share * len(stroke)) for share in ((0.3, 0.7) if direction == 1 else (0.7, 0.3)))
+    columns[stroke[far_out] : stroke[far_out] + rows, 2] = 0.0
+    columns[stroke[far_in] : stroke[far_in] + rows, 2] = 7.5
     lines = [f"{HEADER},branch"]
     for row, branch in zip(columns, recording.branch, strict=True):
         lines.append(",".join([*(f"{value:.5f}" for value in row), word[int(branch)]]))
