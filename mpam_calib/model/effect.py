@@ -20,6 +20,7 @@ from mpam_calib.errors import InputError
 from mpam_calib.model.bend import DRIVERS, FORM, bend_factor, bend_parameters
 from mpam_calib.model.priors import Parameter
 from mpam_calib.model.state import Setting, State
+from mpam_calib.specimen.arguments import is_number
 from mpam_calib.specimen.effect_ids import add_effect_id, load_outside_effects
 
 Array = NDArray[np.float64]
@@ -147,6 +148,8 @@ def _demand_effect(given: object) -> None:
     functions = {"parameters": given.parameters, "apply": given.apply, **given.forms, **given.own}
     for name, function in functions.items():
         demand(callable(function), name, function, "a function")
+    loose = is_number(given.looseness) and 0.0 < given.looseness < np.inf
+    demand(loose, "looseness", given.looseness, "a number above 0")
     for driver, degree in given.bends.items():
         demand(driver in DRIVERS, "bends", driver, f"one of {', '.join(DRIVERS)}")
         whole = isinstance(degree, int) and not isinstance(degree, bool) and degree > 0

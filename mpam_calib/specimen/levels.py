@@ -74,15 +74,15 @@ def static_levels(pressure: Floats) -> Ints:
 
 
 def stroke_levels(
-    pressure: Floats, units: Ints, steady: Bools, gaps: tuple[float, float] = STROKE_GAPS
+    pressure: Floats, units: Ints, steady: Bools, gaps: tuple[float, float] = STROKE_GAPS, least: int = 1
 ) -> Ints:
     """Levels of loops recorded in time, shape (rows,), from 0 upwards.
 
     ``pressure`` in Pa; ``units`` numbers the strokes (contiguous runs, from 0); ``steady`` is false
-    for rows whose pressure is being changed on purpose (pressurising, depressurising). The
-    strokes' medians are clustered (``gaps`` as in :func:`gap_clusters`); then runs of rows that are clearly
-    at another level (a change of pressure during a hold) are moved there. Where nothing but the pressure
-    parts two strokes (each way back was left out), it does.
+    for rows whose pressure is being changed on purpose (pressurising, depressurising). The strokes'
+    medians, those of ``least`` rows or more, are clustered (``gaps`` as in :func:`gap_clusters`); then runs
+    of rows that are clearly at another level (a change of pressure during a hold) are moved there. Where
+    nothing but the pressure parts two strokes (each way back was left out), it does.
     """
     units = _cut_where_wide(pressure, units, gaps)
     starts = run_starts(units)
@@ -90,7 +90,7 @@ def stroke_levels(
     medians = np.array([np.median(piece) for piece in pieces])
     scatter = np.array([np.median(np.abs(piece - m)) for piece, m in zip(pieces, medians, strict=True)])
     sizes = np.array([len(piece) for piece in pieces])
-    counts = steady[starts] & (sizes >= 0.05 * np.median(sizes))
+    counts = steady[starts] & (sizes >= max(least, 0.05 * np.median(sizes)))
     if not counts.any():
         return static_levels(pressure)
     label = gap_clusters(medians[counts], gaps, 1.4826 * float(np.median(scatter[counts])))
@@ -133,13 +133,21 @@ def setpoint_levels(setpoint: Floats, displacement: Floats, branch: Ints, units:
     """
     exact = np.unique(np.round(setpoint, 3), return_inverse=True)[1].astype(np.int64)
     changed = np.diff(exact, prepend=exact[0]) != 0
-    if len(setpoint) >= STEADY * (np.count_nonzero(changed) + 1):
+    if len(setpoint) >= STEADY * (np.count_nonzero(changed) + 1) and not _ramped(exact):
         far_apart = gap_clusters(setpoint, STATIC_GAPS).max() == exact.max()
         on_the_way = changed & _under_way(displacement, branch, units)
         if far_apart or np.count_nonzero(on_the_way) <= ON_THE_WAY * np.count_nonzero(changed):
             return exact
     steady = ~np.isin(branch, [PRESSURISING, DEPRESSURISING])
-    return stroke_levels(setpoint, units, steady, STATIC_GAPS)
+    return stroke_levels(setpoint, units, steady, STATIC_GAPS, STEADY)
+
+
+def _ramped(values: Ints) -> bool:
+    """Whether most of the values (rows,), numbered from 0, never stay."""
+    starts = run_starts(run_ids(values))
+    longest = np.zeros(values.max() + 1)
+    np.maximum.at(longest, values[starts], np.diff(np.append(starts, len(values))))
+    return bool(np.mean(longest < STEADY) > 0.5)
 
 
 def _under_way(displacement: Floats, branch: Ints, units: Ints) -> Bools:

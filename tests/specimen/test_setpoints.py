@@ -61,13 +61,13 @@ def test_setpoints_that_are_commanded_may_lie_close_together(tmp_path: Path, dwe
     assert specimen.levels_Pa == pytest.approx([300e3, 301e3, 302e3])
 
 
-def test_a_ramp_between_two_setpoints_read_back_is_no_level(tmp_path: Path) -> None:
-    recording = loops((50.0, 100.0, 150.0), cycles=2, rate=20.0, dwell=40)
-    flicker = 0.1 * (np.arange(len(recording.time)) // 15 % 2)
-    setpoint = recording.pressure.copy()
-    for change in np.flatnonzero(np.diff(recording.pressure)):
-        setpoint[change - 20 : change + 1] = np.linspace(
-            recording.pressure[change], recording.pressure[change + 1], 21
-        )
+@pytest.mark.parametrize("size", [0.0, 0.1])
+def test_a_ramp_between_two_setpoints_read_back_is_no_level(tmp_path: Path, size: float) -> None:
+    recording = loops((50.0, 100.0, 150.0), cycles=2, rate=20.0, dwell=40, pressure_sd=0.3)
+    commanded = 50.0 * np.round(recording.pressure / 50.0)
+    flicker = size * (np.arange(len(recording.time)) // 15 % 2)
+    setpoint = commanded.copy()
+    for change in np.flatnonzero(np.diff(commanded)):
+        setpoint[change - 20 : change + 1] = np.linspace(commanded[change], commanded[change + 1], 21)
     specimen = with_setpoints(tmp_path, recording, setpoint + flicker)
     assert specimen.levels_Pa == pytest.approx([50e3, 100e3, 150e3], abs=100.0)
