@@ -70,15 +70,15 @@ def _lead(view: CalibrationView) -> list[Block]:
 
 def _fit_cards(view: CalibrationView) -> list[KeyNumber]:
     """What the simulation misses, and whether levels left out are foreseen, where these were assessed."""
-    share = held_between(view)
-    held = "" if share is None else f"levels left out: {100 * share:.0f} % of readings in their 90 % band"
+    held = held_between(view)
+    left_out = "" if held is None else f"levels left out: {held} of readings in their 90 % band"
     if math.isfinite(view.remainder):
         size, noise = (fixed(x, decimals(x)) for x in (view.remainder, view.noise))
         words = f"sensor noise: {noise} N" if math.isfinite(view.noise) else ""
-        return [KeyNumber("Simulation misses by", size, "N", words, held)]
-    if share is None:
+        return [KeyNumber("Simulation misses by", size, "N", words, left_out)]
+    if held is None:
         return []
-    text = f"{100 * share:.0f}"
+    text = f"{100 * held.share:.0f}"
     return [KeyNumber("Levels left out", text, "%", "of readings in their 90 % band", "should be 90 %")]
 
 

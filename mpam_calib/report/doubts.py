@@ -29,7 +29,7 @@ def overruled_slack(view: CalibrationView) -> Limit | None:
     if slack.empty:
         return None
     floor = max(float(slack["force_N"].median()), 0.0)
-    pull, sd = _foreseen(view, slack)
+    pull, sd = _foreseen(slack)
     wrong = pull > floor + BELIEVED_SDS * sd
     if not wrong.any():
         return None
@@ -49,26 +49,10 @@ def overruled_slack(view: CalibrationView) -> Limit | None:
     return Limit("caution", sentence, words)
 
 
-def _foreseen(view: CalibrationView, rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Force and sd (n,), N, of a new reading at each row; 0 past the free contraction."""
-    force, sd = np.zeros(len(rows)), np.full(len(rows), np.inf)
-    bands, blocked = view.quantity("force_N_observed"), view.quantity("blocked_force_N_observed")
-    kind, place, pressure = (rows[name].to_numpy() for name in ("kind", "contraction", "pressure_kPa"))
-    at = kind == "blocked_force"
-    if len(blocked):
-        force[at], sd[at] = _between(pressure[at], blocked["pressure_kPa"], blocked)
-    for level, branch in set(zip(rows["level_kPa"][~at], rows["branch"][~at], strict=True)):
-        band = bands[(bands["pressure_kPa"] == level) & (bands["branch"] == (branch or "mean"))]
-        here = ~at & ((rows["level_kPa"] == level) & (rows["branch"] == branch)).to_numpy()
-        here &= place <= band["contraction"].max()
-        if here.any():
-            force[here], sd[here] = _between(place[here], band["contraction"], band)
-    return force, sd
-
-
-def _between(x: np.ndarray, grid: pd.Series, band: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    middle, low, high = (np.interp(x, grid, band[q]) for q in ("q50", "q05", "q95"))
-    return middle, (high - low) / (2.0 * Z90)
+def _foreseen(rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Force and sd (n,), N, of a new reading at each row; nan where it is not known."""
+    low, high = (rows[name].to_numpy(dtype=float) for name in ("low_N", "high_N"))
+    return (low + high) / 2.0, (high - low) / (2.0 * Z90)
 
 
 def wandering(view: CalibrationView) -> Limit | None:

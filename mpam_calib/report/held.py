@@ -3,29 +3,56 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
+import pandas as pd
 
 from mpam_calib.report.limit import Limit
 from mpam_calib.report.view import CalibrationView
 
 HELD: Final = 0.80
 """Least share of readings in bands that should hold 90 % of them ..."""
+CHANCE: Final = 0.01
+"""... which is an alarm where so few would lie in them by chance less often than this."""
 HELD_READINGS: Final = 20
-"""... where there are so many; of fewer a fifth may lie outside by chance."""
+"""Of fewer readings nothing is said."""
 NEAR: Final = 0.02
 """Contraction up to which readings lie near full length, where the blocked force is read."""
 UNSETTLED: Final = frozenset({"stress_softening", "creep", "force_drift", "rate_friction", "presliding"})
 """Effects that the bands, which are a settled muscle's, leave out where the readings show them."""
 
 
+@dataclass(frozen=True)
+class Held:
+    """How many of so many readings lie in bands that should hold 90 % of them."""
+
+    readings: float
+    share: float
+
+    @property
+    def enough(self) -> bool:
+        """Whether there is nothing to remark."""
+        return self.share >= HELD
+
+    @property
+    def missed(self) -> bool:
+        """Whether too few do for it to be chance."""
+        from scipy.stats import binom
+
+        by_chance = binom.cdf(round(self.share * self.readings), round(self.readings), 0.9)
+        return not self.enough and bool(by_chance < CHANCE)
+
+    def __str__(self) -> str:
+        return f"{100 * self.share:.0f} %"
+
+
 def along_stroke(view: CalibrationView) -> Limit | None:
     """At the recorded pressures themselves the bands miss their readings."""
-    share = held_along(view)
-    if share is None or share >= HELD:
+    held = held_along(view)
+    if held is None or not held.missed:
         return None
-    words = f"at the recorded pressures the bands hold {100 * share:.0f} % of their readings"
+    words = f"at the recorded pressures the bands hold {held} of their readings"
     sentence = (
         f"A{words[1:]}, where they should hold 90 %: the muscle does something that neither the simulation "
         "nor its bands know. Run diagnose, which looks for the cause."
@@ -35,11 +62,11 @@ def along_stroke(view: CalibrationView) -> Limit | None:
 
 def full_length(view: CalibrationView) -> Limit | None:
     """Readings near full length miss their bands: so does the blocked force."""
-    share = held_near(view)
-    if share is None or share >= HELD:
+    held = held_near(view)
+    if held is None or not held.missed:
         return None
     sentence = (
-        f"Do not take the blocked force at its band: near full length {100 * share:.0f} % of the readings "
+        f"Do not take the blocked force at its band: near full length {held} of the readings "
         "lie in bands that should hold 90 % of them. The command diagnose looks for the cause."
     )
     return Limit("caution", sentence, "near full length the bands miss their readings")
@@ -47,8 +74,8 @@ def full_length(view: CalibrationView) -> Limit | None:
 
 def between_levels(view: CalibrationView) -> Limit | None:
     """The inner levels, predicted from the others, miss their readings: so it is anywhere between levels."""
-    share = held_between(view)
-    if share is None or share >= HELD:
+    held = held_between(view)
+    if held is None or not held.missed:
         return None
     recorded = along_stroke(view) is None
     advice = (
@@ -56,61 +83,65 @@ def between_levels(view: CalibrationView) -> Limit | None:
     )
     sentence = (
         f"{advice}: a level between others, predicted from them, has "
-        f"{100 * share:.0f} % of its readings inside bands that should hold 90 % of them."
+        f"{held} of its readings inside bands that should hold 90 % of them."
     )
     return Limit("caution", sentence, "between the recorded pressures the bands are too narrow")
 
 
 def beyond_levels(view: CalibrationView) -> Limit | None:
     """The outer levels, predicted from the others, miss their readings."""
-    share = _held_left_out(view, extrapolated=True)
-    if share is None or share >= HELD:
+    held = _held_left_out(view, extrapolated=True)
+    if held is None or not held.missed:
         return None
     sentence = (
         "Do not extrapolate in pressure: the lowest and the highest level, predicted from the others, have "
-        f"{100 * share:.0f} % of their readings inside bands that should hold 90 % of them."
+        f"{held} of their readings inside bands that should hold 90 % of them."
     )
     return Limit("good", sentence, "beyond the recorded pressures the bands are too narrow")
 
 
-def held_between(view: CalibrationView) -> float | None:
-    """Share of the inner levels' readings in the 90 % bands that the others give; None where they are few."""
+def held_between(view: CalibrationView) -> Held | None:
+    """The inner levels' readings in the 90 % bands that the others give; None where they are few."""
     return _held_left_out(view, extrapolated=False)
 
 
-def _held_left_out(view: CalibrationView, extrapolated: bool) -> float | None:
+def _held_left_out(view: CalibrationView, extrapolated: bool) -> Held | None:
     rows = view.left_out
     if rows.empty:
         return None
     rows = rows[rows["extrapolated"].astype(bool) == extrapolated]
-    return float(rows["inside90"].mean()) if rows["readings"].sum() >= HELD_READINGS else None
+    return _held(rows["inside90"].mean(), rows["readings"].sum())
 
 
-def held_along(view: CalibrationView) -> float | None:
-    """Share of all readings of the stroke in the 90 % bands of new ones; None where it says nothing."""
+def held_along(view: CalibrationView) -> Held | None:
+    """All readings of the stroke in the 90 % bands of new ones; None where they say nothing."""
     return _held_up_to(view, math.inf)
 
 
-def held_near(view: CalibrationView) -> float | None:
-    """Share of the readings near full length in the 90 % bands of new ones; None where it says nothing."""
+def held_near(view: CalibrationView) -> Held | None:
+    """The readings near full length in the 90 % bands of new ones; None where they say nothing."""
     return _held_up_to(view, NEAR)
 
 
-def _held_up_to(view: CalibrationView, contraction: float) -> float | None:
+def _held_up_to(view: CalibrationView, contraction: float) -> Held | None:
     """None where readings are few, or where a declared effect sets them apart from a settled muscle."""
     rows = view.readings("loops", "force_map")
     rows = rows[(rows["contraction"] <= contraction) & ~rows["censored"].astype(bool)]
-    bands = view.quantity("force_N_observed")
     declared = {effect.split(":")[0] for effect in view.simulation.effects}
-    if bands.empty or UNSETTLED & declared:
+    if UNSETTLED & declared:
         return None
-    inside = []
-    for (level, branch), here in rows.groupby(["level_kPa", "branch"]):
-        band = bands[(bands["pressure_kPa"] == level) & (bands["branch"] == (branch or "mean"))]
-        # Past the free contraction there is no band.
-        here = here[here["contraction"] <= band["contraction"].max()]
-        if not here.empty:
-            low, high = (np.interp(here["contraction"], band["contraction"], band[q]) for q in ("q05", "q95"))
-            inside.append((here["force_N"] >= low) & (here["force_N"] <= high))
-    held = np.concatenate(inside) if inside else np.zeros(0, dtype=bool)
-    return float(held.mean()) if len(held) >= HELD_READINGS else None
+    # Past the free contraction there is no band.
+    rows = rows[rows["contraction"] <= rows["level_kPa"].map(_band_ends(view))]
+    # At each reading's own pressure: that of its level is another where a regulator is slow.
+    rows = rows.dropna(subset=["low_N", "high_N"])
+    return _held(rows["force_N"].between(rows["low_N"], rows["high_N"]).mean(), len(rows))
+
+
+def _band_ends(view: CalibrationView) -> pd.Series:
+    """The largest contraction in the bands of each level, by its pressure."""
+    ends: pd.Series = view.quantity("force_N").groupby("pressure_kPa")["contraction"].max()
+    return ends
+
+
+def _held(share: float, readings: float) -> Held | None:
+    return Held(float(readings), float(share)) if readings >= HELD_READINGS else None

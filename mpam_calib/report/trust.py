@@ -14,6 +14,7 @@ from mpam_calib.posterior.convergence import ESS_WANTED, RHAT_LIMIT
 from mpam_calib.report.blocks import Level, Verdict
 from mpam_calib.report.doubts import Z90, look_first, overruled_slack, wandering
 from mpam_calib.report.held import (
+    Held,
     along_stroke,
     between_levels,
     beyond_levels,
@@ -174,6 +175,10 @@ def _always(view: CalibrationView) -> bool:
     return True
 
 
+def _enough(held: Held | None) -> bool:
+    return held is not None and held.enough
+
+
 @dataclass(frozen=True)
 class Check:
     """A check, what holds when it finds nothing ("": not worth saying), and whether it could be made."""
@@ -189,12 +194,12 @@ CHECKS: tuple[Check, ...] = (
     Check(
         along_stroke,
         "the readings lie in their bands",
-        lambda view: held_along(view) is not None and noise_size(view) is None,
+        lambda view: _enough(held_along(view)) and noise_size(view) is None,
     ),
     Check(
         between_levels,
         "the inner levels lie in the bands that the others give",
-        lambda view: held_between(view) is not None and noise_size(view) is None,
+        lambda view: _enough(held_between(view)) and noise_size(view) is None,
     ),
     Check(beyond_levels),
     Check(wandering),
@@ -208,7 +213,7 @@ CHECKS: tuple[Check, ...] = (
     Check(
         full_length,
         "the readings near full length lie in their bands",
-        lambda view: held_near(view) is not None and noise_size(view) is None,
+        lambda view: _enough(held_near(view)) and noise_size(view) is None,
     ),
     Check(band_width, f"the bands are within ± {100 * WIDE_CAUTION:.0f} %"),
     Check(extrapolation, "nothing is extrapolated", lambda view: not view.tensile),

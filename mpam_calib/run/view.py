@@ -12,18 +12,16 @@ from numpy.typing import NDArray
 from mpam_calib.calibration import Calibration
 from mpam_calib.model.model import CONTRACTION_SD
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE
-from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
-from mpam_calib.posterior.draws import Draws, prior_draws
+from mpam_calib.posterior.draws import prior_draws
 from mpam_calib.posterior.material import material_folder
-from mpam_calib.posterior.points import KINDS
 from mpam_calib.posterior.stored import unconverged
-from mpam_calib.prediction.fitted import fitted_force, fitted_stress, noise_of
 from mpam_calib.prediction.left_out import levels_left_out
 from mpam_calib.prediction.strain_range import strain_range_table
-from mpam_calib.report.view import OBSERVED_COLUMNS, CalibrationView, Convergence
+from mpam_calib.report.view import CalibrationView, Convergence
 from mpam_calib.run.folder import versions
+from mpam_calib.run.observed import in_kpa, observed_readings
 from mpam_calib.specimen.oddities import level_stray, oddities
 from mpam_calib.specimen.recording import Loops
 from mpam_calib.specimen.summary import reading_noise
@@ -31,10 +29,7 @@ from mpam_calib.units import KPA
 
 Array = NDArray[np.float64]
 
-DRAWS = 200
-"""Draws behind the fitted value of each reading."""
 NOT_PHYSICS = (WHITE, CORRELATED, TIME, GROWTH, FREEDOM, SMOOTH, ROUGH, NOISE, MISFIT, CONTRACTION_SD)
-BRANCH_WORDS = {1: "loading", -1: "unloading", 0: ""}
 PROVENANCE = {
     "reconstructed": "These data are reconstructed from printed tables, not measured.",
     "synthetic": "These data are synthetic: a simulation made them, not a rig.",
@@ -48,7 +43,7 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
     summary = calibration.summary
     worst = summary.iloc[int(summary["rhat"].to_numpy().argmax())]
     ensembles, steps, walkers, _ = sampling.chain.shape
-    observed, remainder, noise = _observed(calibration)
+    observed, remainder, noise = observed_readings(calibration)
     headline = _headline(calibration)
     draws = {item.name: item.draws for item in calibration.reported if item.name in headline}
     prior = prior_draws(model, [item.name for item in calibration.reported], calibration.seed)
@@ -72,7 +67,7 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
             acceptance=sampling.acceptance,
             modes=len(sampling.modes),
         ),
-        levels_kPa=tuple(_in_kpa(specimen.levels_Pa)),
+        levels_kPa=tuple(in_kpa(specimen.levels_Pa)),
         draws=draws,
         prior_draws={name: prior[name] for name in prior if name in headline},
         headline=headline,
@@ -96,10 +91,6 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
         strays_kPa=() if specimen.loops is None else _strays_kPa(specimen.loops, specimen.levels_Pa),
         pressure_bias_sd_kPa=specimen.sensors.pressure_bias_sd_kPa,
     )
-
-
-def _in_kpa(levels: Array) -> Array:
-    return np.round(levels / KPA, 3)
 
 
 def _strays_kPa(loops: Loops, levels_Pa: Array) -> tuple[float, ...]:
@@ -185,93 +176,3 @@ def _warnings(calibration: Calibration) -> list[str]:
             "longer (--max-steps), then this again."
         )
     return warnings
-
-
-def _observed(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
-    """Reduced readings beside the declared simulation; the remainder's and the noise's size."""
-    model, data = calibration.model, calibration.target.data
-    draws = calibration.draws.thin(DRAWS)
-    frames = []
-    squares: list[Array] = []
-    if data.bins is not None:
-        middle = data.bins.middle()
-        fitted, left = fitted_force(model, draws, middle)
-        rough = float(np.mean(draws.values[ROUGH] ** 2)) if ROUGH in draws.values else 0.0
-        frame = _frame("loops", middle, data.bins.force, data.bins.slack, calibration)
-        frame["stroke"] = data.bins.segment
-        frame["time_s"] = middle.time
-        frame["cycle"] = middle.cycle
-        frame["fitted_N"] = fitted
-        frames.append(frame)
-        squares.append((left + rough)[~data.bins.slack])
-    if data.points is not None:
-        readings = data.points.readings
-        fitted, left = fitted_force(model, draws, readings)
-        for number, kind in enumerate(KINDS):
-            rows = data.points.kind == number
-            if not rows.any():
-                continue
-            frame = _frame(
-                kind, readings.take(rows), data.points.force[rows], data.points.censored[rows], calibration
-            )
-            frame["fitted_N"] = fitted[rows]
-            if kind == "free_contraction" and calibration.target.guide.slope is not None:
-                assert model.setting is not None
-                # Newtons to contraction along the curve's slope there.
-                slope = calibration.target.guide.slope[rows] * model.setting.geometry.L0
-                frame["fitted_N"] = frame["contraction"] - fitted[rows] / slope
-            frames.append(frame)
-            squares.append(left[rows & ~data.points.censored])
-    if data.tensile is not None and model.tensile is not None:
-        frame, left = _tensile_frame(calibration, draws)
-        frames.append(frame)
-    remainder = float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else float("nan")
-    noise = noise_of(draws) if WHITE in draws.values else float("nan")
-    if model.setting is None and MISFIT in draws.values:
-        remainder = float(np.sqrt(np.mean(left)))
-        noise = float(np.mean(draws.values[NOISE]))
-    observed = (
-        pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(OBSERVED_COLUMNS))
-    )
-    return observed.reindex(columns=list(OBSERVED_COLUMNS)), remainder, noise
-
-
-def _frame(
-    kind: str, readings: Readings, force: Array, censored: NDArray[np.bool_], calibration: Calibration
-) -> pd.DataFrame:
-    specimen = calibration.specimen
-    assert specimen.geometry is not None
-    levels = _in_kpa(specimen.levels_Pa)
-    nearest = np.abs(readings.pressure[:, None] - specimen.levels_Pa).argmin(axis=1)
-    level = np.where(readings.level >= 0, readings.level, nearest)
-    return pd.DataFrame(
-        {
-            "kind": kind,
-            "level_kPa": levels[level],
-            "pressure_kPa": readings.pressure / KPA,
-            "contraction": readings.displacement / specimen.geometry.L0,
-            "branch": pd.Series(readings.sign.astype(int)).map(BRANCH_WORDS).to_numpy(),
-            "force_N": force,
-            "censored": censored,
-        }
-    )
-
-
-def _tensile_frame(calibration: Calibration, draws: Draws) -> tuple[pd.DataFrame, Array]:
-    """The tensile readings beside the law, and the remainder's mean square (n,)."""
-    tensile = calibration.target.data.tensile
-    assert tensile is not None
-    stress, left = fitted_stress(calibration.model, draws, tensile.strain)
-    frame = pd.DataFrame(
-        {
-            "kind": "tensile",
-            "level_kPa": np.nan,
-            "pressure_kPa": np.nan,
-            "contraction": tensile.strain,
-            "branch": "",
-            "force_N": tensile.stress,
-            "fitted_N": stress,
-            "censored": False,
-        }
-    )
-    return frame, left

@@ -93,11 +93,13 @@ def muscle(rows_per_branch: int = 240, n_draws: int = 2000, **changes: Any) -> C
             fitted = curve(P, x) * (1 + 0.07 * s)
             wave = 0.5 * np.sin(9 * x / free) * P / 250
             reading = fitted + wave + 0.25 * rng.standard_normal(len(x))
+            half = Z["q95"] * (0.5 + 0.004 * P * (1 + x))
             observed.append(
                 pd.DataFrame(
                     {
                         "kind": "loops", "level_kPa": P, "pressure_kPa": P, "contraction": x,
-                        "branch": branch, "force_N": reading, "fitted_N": fitted, "cycle": 1,
+                        "branch": branch, "force_N": reading, "fitted_N": fitted,
+                        "low_N": fitted - half, "high_N": fitted + half, "cycle": 1,
                         "stroke": 2 * number + (s > 0), "time_s": np.arange(len(x)) * 0.1, "censored": False,
                     }
                 )
@@ -169,8 +171,8 @@ def material(n_draws: int = 2000, **changes: Any) -> CalibrationView:
     observed = pd.DataFrame(
         {
             "kind": "tensile", "level_kPa": np.nan, "pressure_kPa": np.nan, "contraction": x, "branch": "",
-            "force_N": stress(x) + 1500 * rng.standard_normal(400), "fitted_N": stress(x), "cycle": 1,
-            "stroke": 0, "time_s": np.nan, "censored": False,
+            "force_N": stress(x) + 1500 * rng.standard_normal(400), "fitted_N": stress(x), "low_N": np.nan,
+            "high_N": np.nan, "cycle": 1, "stroke": 0, "time_s": np.nan, "censored": False,
         }
     )  # fmt: skip
     draws = {

@@ -21,30 +21,30 @@ def sound() -> CalibrationView:
 
 
 def with_slack(
-    view: CalibrationView, contraction: float, kind: str = "force_map", floor: float = 0.0
+    view: CalibrationView, pull: float, kind: str = "force_map", floor: float = 0.0
 ) -> CalibrationView:
-    """One more reading, at 100 kPa, that is said to be slack."""
-    row = {"kind": kind, "level_kPa": 100.0, "pressure_kPa": 100.0, "contraction": contraction, "branch": ""}
-    slack = pd.DataFrame([row | {"force_N": floor, "fitted_N": 0.0, "censored": True}])
-    blocked = view.bands[(view.bands["quantity"] == "force_N_observed") & (view.bands["contraction"] == 0.0)]
-    blocked = blocked[blocked["branch"] == "mean"].assign(quantity="blocked_force_N_observed")
-    return replace(view, observed=pd.concat([view.observed, slack]), bands=pd.concat([view.bands, blocked]))
+    """One more reading, at 100 kPa, that is said to be slack where the fit pulls so hard (N)."""
+    row = {"kind": kind, "level_kPa": 100.0, "pressure_kPa": 100.0, "contraction": 0.0, "branch": ""}
+    foreseen = {"fitted_N": pull, "low_N": pull - 1.5, "high_N": pull + 1.5}
+    slack = pd.DataFrame([row | foreseen | {"force_N": floor, "censored": True}])
+    return replace(view, observed=pd.concat([view.observed, slack]))
 
 
 @pytest.mark.parametrize("kind", ["force_map", "blocked_force"])
 def test_slack_where_the_fit_pulls(sound: CalibrationView, kind: str) -> None:
-    limit = doubts.overruled_slack(with_slack(sound, 0.0, kind))
+    limit = doubts.overruled_slack(with_slack(sound, 35.0, kind))
     assert limit is not None and limit.level == "caution"
     assert limit.brief == "1 slack reading, at 100 kPa, is not believed"
     assert "up to 35 N" in limit.sentence
 
 
 @pytest.mark.parametrize(
-    ("contraction", "floor"),
-    [(0.5, 0.0), (0.272, 0.0), (0.0, 35.0)],  # past the free contraction, just before it, a floor that high
+    ("pull", "floor"),
+    # past the free contraction, just before it, a floor that high, and where nothing is foreseen
+    [(-20.0, 0.0), (2.0, 0.0), (35.0, 35.0), (float("nan"), 0.0)],
 )
-def test_slack_that_is_believed(sound: CalibrationView, contraction: float, floor: float) -> None:
-    assert doubts.overruled_slack(with_slack(sound, contraction, floor=floor)) is None
+def test_slack_that_is_believed(sound: CalibrationView, pull: float, floor: float) -> None:
+    assert doubts.overruled_slack(with_slack(sound, pull, floor=floor)) is None
     assert doubts.overruled_slack(sound) is None
 
 

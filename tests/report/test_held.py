@@ -36,12 +36,11 @@ def test_readings_anywhere_along_the_stroke(sound: CalibrationView, sds: float, 
     praise = "the readings lie in their bands" in assess(view).reasons[-1]
     assert praise != told
     if limit is not None:
-        share = held.held_along(view)
-        assert share is not None and 0.4 < share < 0.6
+        found = held.held_along(view)
+        assert found is not None and 0.4 < found.share < 0.6
         assert limit.level == "caution"
-        assert (
-            limit.brief == f"at the recorded pressures the bands hold {100 * share:.0f} % of their readings"
-        )
+        words = f"the bands hold {100 * found.share:.0f} % of their readings"
+        assert limit.brief == f"at the recorded pressures {words}"
         assert "Run diagnose" in limit.sentence
 
 
@@ -91,6 +90,36 @@ def test_few_readings_near_full_length_say_nothing(sound: CalibrationView) -> No
     verdict = assess(replace(sound, observed=observed))
     assert held.held_near(replace(sound, observed=observed)) is None
     assert not any("full length" in reason for reason in verdict.reasons)
+
+
+def kept(view: CalibrationView, readings: int, inside: int) -> CalibrationView:
+    """So few readings, at full length, of which so many lie in their bands."""
+    observed = view.observed[view.observed["kind"] == "loops"].iloc[:readings].assign(contraction=0.0)
+    observed["force_N"] = observed["fitted_N"] + 99.0 * (np.arange(readings) >= inside)
+    return replace(view, observed=observed)
+
+
+@pytest.mark.parametrize(
+    ("readings", "inside", "told"),
+    [(20, 15, False), (20, 13, True), (200, 155, True), (200, 165, False)],
+)
+def test_a_share_that_is_low_by_chance_is_neither_alarm_nor_praise(
+    sound: CalibrationView, readings: int, inside: int, told: bool
+) -> None:
+    """Of twenty readings fifteen or less lie in 90 % bands by chance in one case of 23."""
+    view = kept(sound, readings, inside)
+    assert (held.full_length(view) is not None) == told
+    assert (held.along_stroke(view) is not None) == told
+    praised = "near full length lie in" in assess(view).reasons[-1]
+    assert praised == (inside / readings >= held.HELD)
+
+
+def test_a_reading_is_compared_with_the_band_at_its_own_pressure(sound: CalibrationView) -> None:
+    """A regulator that is slow makes no band of its level wrong: the simulation has the pressure."""
+    observed = sound.observed.copy()
+    moved = 5.0 * np.sin(np.arange(len(observed)))
+    observed[["force_N", "low_N", "high_N"]] = observed[["force_N", "low_N", "high_N"]].add(moved, axis=0)
+    assert held.held_along(replace(sound, observed=observed)) == held.held_along(sound)
 
 
 def left_out_levels(inside: tuple[float, ...], readings: int = 200) -> pd.DataFrame:

@@ -1,0 +1,169 @@
+"""Reduced readings as a calibration's report shows them: beside the fit, and with the bands of new ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpam_calib.calibration import Calibration
+from mpam_calib.model.noise import WHITE
+from mpam_calib.model.readings import Readings
+from mpam_calib.model.remainder import ROUGH
+from mpam_calib.model.tensile import MISFIT, NOISE
+from mpam_calib.posterior.bins import LoopBins
+from mpam_calib.posterior.draws import Draws
+from mpam_calib.posterior.points import KINDS, Points
+from mpam_calib.posterior.target import predict_force
+from mpam_calib.prediction.curves import BATCH_CELLS
+from mpam_calib.prediction.fitted import fitted_force, fitted_stress, noise_of
+from mpam_calib.prediction.reading_noise import ReadingNoise
+from mpam_calib.report.view import OBSERVED_COLUMNS
+from mpam_calib.units import KPA
+
+Array = NDArray[np.float64]
+
+DRAWS, BAND_DRAWS = 200, 400
+"""Draws behind the fitted value of each reading, and behind its band."""
+BRANCH_WORDS = {1: "loading", -1: "unloading", 0: ""}
+
+
+def in_kpa(levels: Array) -> Array:
+    """Levels (Pa) in kPa, to a thousandth: more a median of readings does not mean."""
+    return np.round(levels / KPA, 3)
+
+
+def observed_readings(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
+    """Reduced readings beside the declared simulation; the remainder's and the noise's size."""
+    model, data = calibration.model, calibration.target.data
+    draws = calibration.draws.thin(DRAWS)
+    frames = []
+    squares: list[Array] = []
+    if data.bins is not None:
+        frame, square = _bins_frame(data.bins, calibration, draws)
+        frames.append(frame)
+        squares.append(square)
+    if data.points is not None:
+        found = _points_frames(data.points, calibration, draws)
+        frames += [frame for frame, _ in found]
+        squares += [square for _, square in found]
+    if data.tensile is not None and model.tensile is not None:
+        frame, left = _tensile_frame(calibration, draws)
+        frames.append(frame)
+    remainder = float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else float("nan")
+    noise = noise_of(draws) if WHITE in draws.values else float("nan")
+    if model.setting is None and MISFIT in draws.values:
+        remainder = float(np.sqrt(np.mean(left)))
+        noise = float(np.mean(draws.values[NOISE]))
+    observed = (
+        pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(OBSERVED_COLUMNS))
+    )
+    return observed.reindex(columns=list(OBSERVED_COLUMNS)), remainder, noise
+
+
+def _bins_frame(bins: LoopBins, calibration: Calibration, draws: Draws) -> tuple[pd.DataFrame, Array]:
+    """Reduced loops, and the remainder's mean square (n,) of those that are not slack.
+
+    A bin's reading is a mean over its width: so is what it is compared with, or a curve's bend would look
+    like a misfit.
+    """
+    middle = bins.middle()
+    fitted, left = fitted_force(calibration.model, draws, bins.readings)
+    rough = float(np.mean(draws.values[ROUGH] ** 2)) if ROUGH in draws.values else 0.0
+    frame = _frame("loops", middle, bins.force, bins.slack, calibration)
+    low, high = _bands(calibration, bins.readings, len(bins))
+    frame = frame.assign(
+        stroke=bins.segment, time_s=middle.time, cycle=middle.cycle,
+        fitted_N=_means(fitted, len(bins)), low_N=low, high_N=high,
+    )  # fmt: skip
+    return frame, (_means(left, len(bins)) + rough)[~bins.slack]
+
+
+def _points_frames(
+    points: Points, calibration: Calibration, draws: Draws
+) -> list[tuple[pd.DataFrame, Array]]:
+    """Static readings of each kind, and the remainder's mean square (n,) of those that are not slack."""
+    model, guide = calibration.model, calibration.target.guide
+    assert model.setting is not None
+    fitted, left = fitted_force(model, draws, points.readings)
+    low, high = _bands(calibration, points.readings, len(points))
+    found = []
+    for number in np.unique(points.kind):
+        rows = points.kind == number
+        some = points.take(rows)
+        frame = _frame(KINDS[number], some.readings, some.force, some.censored, calibration)
+        if KINDS[number] != "free_contraction":
+            frame = frame.assign(fitted_N=fitted[rows], low_N=low[rows], high_N=high[rows])
+        elif guide.slope is not None:
+            # Newtons to contraction along the curve's slope there.
+            slope = guide.slope[rows] * model.setting.geometry.L0
+            frame["fitted_N"] = frame["contraction"] - fitted[rows] / slope
+        found.append((frame, left[rows & ~points.censored]))
+    return found
+
+
+def _means(values: Array, count: int) -> Array:
+    """Means (..., count) over the places of each reading, values (..., places × count)."""
+    return np.asarray(values.reshape(*values.shape[:-1], -1, count).mean(axis=-2))
+
+
+def _bands(calibration: Calibration, places: Readings, count: int) -> tuple[Array, Array]:
+    """Ends (count,), N, of the 90 % band of a new reading where, and at the pressure at which, each was made.
+
+    Each reading is a mean over places, all first ones first.
+    """
+    model, draws = calibration.model, calibration.draws.thin(BAND_DRAWS)
+    assert model.setting is not None
+    size = max(1, BATCH_CELLS // len(places))
+    parts = []
+    for i in range(0, len(draws), size):
+        values = {k: v[i : i + size] for k, v in draws.values.items()}
+        parts.append(_means(predict_force(model, values, draws.eta[i : i + size], places), count))
+    force = np.concatenate(parts)
+    rng = np.random.default_rng([calibration.seed, 12])
+    if ROUGH in draws.values:
+        force = force + draws.values[ROUGH] * rng.standard_normal(force.shape)
+    seen = force + ReadingNoise(draws.values, model.setting.force_scale).draw(force, rng)
+    low, high = np.quantile(seen, [0.05, 0.95], axis=0)
+    return low, high
+
+
+def _frame(
+    kind: str, readings: Readings, force: Array, censored: NDArray[np.bool_], calibration: Calibration
+) -> pd.DataFrame:
+    specimen = calibration.specimen
+    assert specimen.geometry is not None
+    levels = in_kpa(specimen.levels_Pa)
+    nearest = np.abs(readings.pressure[:, None] - specimen.levels_Pa).argmin(axis=1)
+    level = np.where(readings.level >= 0, readings.level, nearest)
+    return pd.DataFrame(
+        {
+            "kind": kind,
+            "level_kPa": levels[level],
+            "pressure_kPa": readings.pressure / KPA,
+            "contraction": readings.displacement / specimen.geometry.L0,
+            "branch": pd.Series(readings.sign.astype(int)).map(BRANCH_WORDS).to_numpy(),
+            "force_N": force,
+            "censored": censored,
+        }
+    )
+
+
+def _tensile_frame(calibration: Calibration, draws: Draws) -> tuple[pd.DataFrame, Array]:
+    """The tensile readings beside the law, and the remainder's mean square (n,)."""
+    tensile = calibration.target.data.tensile
+    assert tensile is not None
+    stress, left = fitted_stress(calibration.model, draws, tensile.strain)
+    frame = pd.DataFrame(
+        {
+            "kind": "tensile",
+            "level_kPa": np.nan,
+            "pressure_kPa": np.nan,
+            "contraction": tensile.strain,
+            "branch": "",
+            "force_N": tensile.stress,
+            "fitted_N": stress,
+            "censored": False,
+        }
+    )
+    return frame, left
