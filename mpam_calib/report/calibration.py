@@ -24,7 +24,9 @@ from mpam_calib.report.page import (
     Text,
 )
 from mpam_calib.report.parameters import RIGHT, learnt_table, summary_table
+from mpam_calib.report.reach import endless
 from mpam_calib.report.spoken import spoken
+from mpam_calib.report.tensile import tensile_lead, tensile_sections
 from mpam_calib.report.trust import assess
 from mpam_calib.report.view import CalibrationView
 
@@ -34,12 +36,9 @@ LONG_TABLE = 12
 
 def calibration_page(view: CalibrationView) -> Page:
     """The report of one calibration: a muscle, or a bladder material if only a tensile test was made."""
-    if view.tensile:
-        from mpam_calib.report.tensile import tensile_lead, tensile_sections
-
-        lead, sections = tensile_lead(view), tensile_sections(view)
-    else:
-        lead, sections = _lead(view), _sections(view)
+    lead = tensile_lead(view) if view.tensile else _lead(view)
+    sections = [] if view.tensile else _sections(view)
+    sections += tensile_sections(view) if view.stretched else []
     notice: list[Block] = [Notice(view.provenance)] if view.provenance else []
     kind = "Bladder material" if view.tensile else "Muscle"
     subtitle = f"{kind} calibration" + (f" · {view.material}" if view.material else "")
@@ -62,6 +61,7 @@ def _lead(view: CalibrationView) -> list[Block]:
         value, band = _band(free, 100.0)
         parts.append(Markup("shortens by ") + spoken(value, band, "%", " of its length without load"))
         note = f"at {top:.4g} kPa, of the length at rest"
+        note += "; the upper end is where the curves end" if endless(view, free) else ""
         cards.append(KeyNumber("Free contraction", value, "%", f"90 % band: {band} %", note))
     cards += _fit_cards(view)
     sentence = Markup("At {} kPa, {} {}.").format(f"{top:.4g}", view.name, Markup(" and ").join(parts))
@@ -138,8 +138,8 @@ def _residual_section(view: CalibrationView) -> Section:
 def _pressure_section(view: CalibrationView) -> Section:
     measured = not view.readings("blocked_force", "free_contraction").empty
     caption = (
-        "Line: median. Dark and light band: 50 % and 90 %. Dots: the levels of the data; hollow where no "
-        "reading comes near." + (" Crosses: readings of the test itself." if measured else "")
+        "Line: median. Dark and light band: 50 % and 90 %. Dots: the levels of the data; hollow where "
+        "the readings end before." + (" Crosses: readings of the test itself." if measured else "")
     )
     levels = pd.DataFrame([_level_row(view, level) for level in sorted(float(x) for x in view.levels_kPa)])
     right = dict.fromkeys(levels.columns, "{}")

@@ -15,7 +15,7 @@ from mpam_calib.report.view import CalibrationView
 BELIEVED_SDS: Final = 5.0
 """A fit that pulls by so many sds of a reading above the floor does not believe that it is slack."""
 WANDER_BAD: Final = 0.20
-"""A pressure that strays by this share of its level belongs to no level ..."""
+"""A stroke whose pressure strays by this share of its level belongs to another ..."""
 WANDER_TOP: Final = 0.02
 """... where that is more than this share of the highest: a gauge's noise is no wandering."""
 Z90: Final = 1.6449
@@ -56,17 +56,17 @@ def _foreseen(rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
 
 
 def wandering(view: CalibrationView) -> Limit | None:
-    """A level whose pressure strays so far that its readings belong to no level."""
+    """A level with strokes whose pressure strays so far that they belong to another."""
     top = WANDER_TOP * view.top_level_kPa
     found = zip(view.levels_kPa, view.strays_kPa, strict=bool(view.strays_kPa))
     far = [(level, stray) for level, stray in found if stray > max(WANDER_BAD * level, top)]
     if not far:
         return None
     level, stray = max(far, key=lambda pair: pair[1])
-    words = f"the pressure of the level {level:.4g} kPa wanders by {stray:.3g} kPa"
+    words = f"strokes at the level {level:.4g} kPa stray from it by up to {stray:.3g} kPa"
     more = f", and {len(far) - 1} more levels do the like" if len(far) > 1 else ""
     sentence = (
-        f"T{words[1:]}{more}: strokes of different pressures are taken for one level. Look at "
+        f"S{words[1:]}{more}: strokes of different pressures are taken for one level. Look at "
         "setpoint_kPa and at what was recorded."
     )
     return Limit("bad", sentence, words)

@@ -33,9 +33,9 @@ def noise_size(view: CalibrationView) -> Limit | None:
             return _misfit(_level(fitted, reading, top), fitted, beside)
         if declared and fitted > NOISE_CAUTION * declared:
             words = f"the declared force_sd_N = {declared:g}"
-            return (
-                _noisier(fitted, words) if reading else _misfit(_level(fitted, declared, top), fitted, words)
-            )
+            if reading:
+                return _noisier(fitted, words)
+            return _either(_level(fitted, declared, top), fitted, words)
     if reading and _level(view.noise, reading, top) == "bad":
         return _misfit("caution", view.noise, beside)
     return None
@@ -58,6 +58,17 @@ def _misfit(level: Level, fitted: float, beside: str) -> Limit:
         "simulation fits to within such noise means nothing."
     )
     return Limit(level, sentence, f"w{words}")
+
+
+def _either(level: Level, fitted: float, beside: str) -> Limit:
+    """Without loops nothing tells noise from misfit."""
+    words = f"the noise is {_newtons(fitted)} against {beside}"
+    sentence = (
+        f"T{words[1:]}. Either the load cell is noisier than declared, and the bands follow the readings, or "
+        "what the simulation misses went into the noise, and that it fits to within that means nothing. "
+        "Readings that are repeated in place tell which."
+    )
+    return Limit(level, sentence, words)
 
 
 def _noisier(fitted: float, beside: str) -> Limit:

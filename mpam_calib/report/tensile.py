@@ -67,12 +67,12 @@ def tensile_sections(view: CalibrationView) -> list[Section]:
         caption = (
             "Readings minus law. Dots: single readings. Line: their means over short stretches of the strain."
         )
-        if math.isfinite(view.noise):
+        if view.tensile and math.isfinite(view.noise):
             caption += " Grey: one sigma of the noise."
         found.append(
             Section(
                 "What the law misses",
-                [Figure(residuals.draw(view), caption, "Residuals against strain.")],
+                [Figure(residuals.draw_stress(view), caption, "Residuals against strain.")],
             )
         )
     if not view.strain_range.empty:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from mpam_calib.posterior.convergence import ESS_WANTED, RHAT_LIMIT
+from mpam_calib.posterior.convergence import RHAT_LIMIT
 from mpam_calib.report.blocks import Level, Verdict
 from mpam_calib.report.doubts import Z90, look_first, overruled_slack, wandering
 from mpam_calib.report.held import (
@@ -26,6 +26,7 @@ from mpam_calib.report.held import (
 from mpam_calib.report.limit import Limit
 from mpam_calib.report.noise_size import noise_known, noise_size
 from mpam_calib.report.numbers import significant
+from mpam_calib.report.reach import UNSEEN, cut_off, extrapolation
 from mpam_calib.report.view import CalibrationView
 
 REMAINDER_CAUTION: Final = 0.02
@@ -52,8 +53,10 @@ def convergence(view: CalibrationView) -> Limit | None:
         failed.append(
             f"independent starts disagree on {c.rhat_parameter} (R-hat {c.rhat_max:.3f}, limit {RHAT_LIMIT})"
         )
-    if not c.ess_min >= ESS_WANTED:
-        failed.append(f"the draws are worth only {c.ess_min:.0f} independent ones ({ESS_WANTED:.0f} wanted)")
+    if not c.ess_min >= c.ess_wanted:
+        failed.append(
+            f"the draws are worth only {c.ess_min:.0f} independent ones ({c.ess_wanted:.0f} wanted)"
+        )
     if failed or not c.converged:
         why = "; ".join(failed) or "it was stopped by its step budget"
         sentence = (
@@ -80,10 +83,19 @@ def remainder(view: CalibrationView) -> Limit | None:
     sentence = (
         f"The simulation is wrong by about {size} (root mean square, {100 * share:.1f} % of the largest "
         f"{largest}; sensor noise: {significant(view.noise, 2)} {unit}). "
-        "The bands include this. The command diagnose looks for the cause."
+        f"The bands include this.{_advice(view)}"
     )
     level: Level = "good" if share <= REMAINDER_CAUTION else "caution" if share <= REMAINDER_BAD else "bad"
     return Limit(level, sentence, f"the simulation is wrong by about {size}")
+
+
+def _advice(view: CalibrationView) -> str:
+    """Where to look for what the simulation misses; diagnose takes loops and force maps only."""
+    if view.tensile:
+        return " Try another order, or the strains that the bladder sees ([fit] tensile_strain)."
+    if view.readings("loops", "force_map").empty:
+        return ""
+    return " The command diagnose looks for the cause."
 
 
 def band_width(view: CalibrationView) -> Limit | None:
@@ -100,25 +112,6 @@ def band_width(view: CalibrationView) -> Limit | None:
     if math.isinf(worst):
         words = "a headline number is zero within its band"
     return Limit(level, f"{words[0].upper()}{words[1:]} (half of its 90 % band).", words)
-
-
-def extrapolation(view: CalibrationView) -> Limit | None:
-    """A headline number lies outside the readings."""
-    if view.tensile:
-        return None
-    names = []
-    for quantity, words in (("blocked_force_N", "blocked force"), ("free_contraction", "free contraction")):
-        row = view.at_level(quantity, view.top_level_kPa)
-        if row is not None and bool(row["extrapolated"]):
-            names.append(words)
-    if not names:
-        return None
-    sentence = (
-        f"No reading comes near the {' or the '.join(names)} at {view.top_level_kPa:.4g} kPa: "
-        "the simulation carries the number there, not the data."
-    )
-    verb = "is" if len(names) == 1 else "are"
-    return Limit("caution", sentence, f"the {' and the '.join(names)} {verb} extrapolated")
 
 
 def gauge(view: CalibrationView) -> Limit | None:
@@ -216,7 +209,12 @@ CHECKS: tuple[Check, ...] = (
         lambda view: _enough(held_near(view)) and noise_size(view) is None,
     ),
     Check(band_width, f"the bands are within ± {100 * WIDE_CAUTION:.0f} %"),
-    Check(extrapolation, "nothing is extrapolated", lambda view: not view.tensile),
+    Check(
+        extrapolation,
+        f"nothing is extrapolated by more than {100 * UNSEEN:.0f} %",
+        lambda view: not view.tensile and cut_off(view) is None,
+    ),
+    Check(cut_off),
     Check(source),
     Check(gauge),
     Check(identification, "every parameter is identified", lambda view: not view.unidentified.empty),

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mpam_calib.posterior.convergence import ESS_WANTED
 from mpam_calib.specimen.declaration import Simulation
 
 Floats = NDArray[np.float64]
@@ -39,7 +40,8 @@ class Convergence:
     """How the sampling ended: its worst parameters and its size.
 
     ``rhat_max`` compares independent ensembles; ``modes`` counts the separate explanations that they
-    ended in; ``acceptance`` is the share of accepted proposals (nan: not recorded).
+    ended in; ``acceptance`` is the share of accepted proposals (nan: not recorded), ``ess_wanted`` the least
+    effective sample size that the run was asked for.
     """
 
     converged: bool
@@ -53,6 +55,7 @@ class Convergence:
     draws: int
     acceptance: float = float("nan")
     modes: int = 1
+    ess_wanted: float = ESS_WANTED
 
     @property
     def ess_min(self) -> float:
@@ -77,8 +80,9 @@ class CalibrationView:
     ``remainder`` is the root mean square of what the
     simulation leaves out and ``noise`` one sigma of the sensor, both in N (Pa for a tensile test);
     nan where not assessed; ``reading_noise`` (N) is what readings scatter by from one to the next,
-    ``declared_noise`` the declared ``force_sd_N``; ``strays_kPa`` how far readings of each level's pressure
-    stray from it, shape (levels,), empty without loops. ``unidentified`` has ``parameter, prior_sd,
+    ``declared_noise`` the declared ``force_sd_N``; ``strays_kPa`` how far the strokes of each level
+    stray from its pressure, shape (levels,), empty without loops; ``curves_end`` the contraction up to which
+    the curves behind the bands were looked at. ``unidentified`` has ``parameter, prior_sd,
     posterior_sd, contraction`` (1 − 90 % band of the posterior over that of the prior) ``, sentence``.
     ``left_out`` has a row for each level that was predicted from the others: ``pressure_kPa, readings,
     rmse_N, bias_N, bias_sd_N, inside90, extrapolated``.
@@ -112,11 +116,17 @@ class CalibrationView:
     reading_noise: float = float("nan")
     declared_noise: float = float("nan")
     strays_kPa: Sequence[float] = ()
+    curves_end: float = float("nan")
     pressure_bias_sd_kPa: float = 0.0
 
     @property
     def tensile(self) -> bool:
-        """Whether this is a bladder material's tensile test, with bands on stress."""
+        """Whether this is a bladder material's tensile test, with bands on stress and no muscle."""
+        return self.stretched and not (self.bands["quantity"] == "force_N").any()
+
+    @property
+    def stretched(self) -> bool:
+        """Whether there are bands on stress: a tensile test of a material, or beside a muscle's readings."""
         return bool((self.bands["quantity"] == "stress_Pa").any())
 
     @property

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from mpam_calib.criticism.rows import telling_points, telling_strokes
-from mpam_calib.posterior.convergence import ESS_WANTED, RHAT_LIMIT
+from mpam_calib.posterior.convergence import RHAT_LIMIT
 from mpam_calib.posterior.points import gather_points
 from mpam_calib.report.view import Convergence
 from mpam_calib.specimen.declaration import Simulation
@@ -92,7 +92,7 @@ def convergence_sentences(c: Convergence) -> str:
     ess = c.ess_min
     settled = (
         "Yes."
-        if c.converged and c.rhat_max <= RHAT_LIMIT and ess >= ESS_WANTED
+        if c.converged and c.rhat_max <= RHAT_LIMIT and ess >= c.ess_wanted
         else "No: treat every number on this page as provisional."
     )
     start = (
@@ -103,7 +103,7 @@ def convergence_sentences(c: Convergence) -> str:
     agreement = (
         f"Agreement (R-hat): {c.rhat_max:.3f} at worst, for {c.rhat_parameter}; 1 is perfect, {RHAT_LIMIT} "
         f"is the limit. Sample size (ESS): the cloud is worth {ess:,.0f} independent draws at worst; "
-        f"{ESS_WANTED:.0f} is the least."
+        f"{c.ess_wanted:.0f} is the least."
     )
     if ess > 0 and math.isfinite(ess):
         agreement += (

@@ -10,19 +10,20 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mpam_calib.calibration import Calibration
-from mpam_calib.model.model import CONTRACTION_SD
+from mpam_calib.model.model import CONTRACTION_SD, Model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
 from mpam_calib.posterior.draws import prior_draws
 from mpam_calib.posterior.material import material_folder
 from mpam_calib.posterior.stored import unconverged
+from mpam_calib.prediction.curves import contraction_grid
 from mpam_calib.prediction.left_out import levels_left_out
 from mpam_calib.prediction.strain_range import strain_range_table
 from mpam_calib.report.view import CalibrationView, Convergence
 from mpam_calib.run.folder import versions
 from mpam_calib.run.observed import in_kpa, observed_readings
-from mpam_calib.specimen.oddities import level_stray, oddities
+from mpam_calib.specimen.oddities import oddities, stroke_stray
 from mpam_calib.specimen.recording import Loops
 from mpam_calib.specimen.summary import reading_noise
 from mpam_calib.units import KPA
@@ -66,6 +67,7 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
             draws=len(calibration.draws),
             acceptance=sampling.acceptance,
             modes=len(sampling.modes),
+            ess_wanted=calibration.ess_wanted,
         ),
         levels_kPa=tuple(in_kpa(specimen.levels_Pa)),
         draws=draws,
@@ -89,12 +91,19 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
         reading_noise=math.nan if specimen.loops is None else reading_noise(specimen.loops),
         declared_noise=specimen.sensors.force_sd_N or math.nan,
         strays_kPa=() if specimen.loops is None else _strays_kPa(specimen.loops, specimen.levels_Pa),
+        curves_end=_curves_end(model),
         pressure_bias_sd_kPa=specimen.sensors.pressure_bias_sd_kPa,
     )
 
 
 def _strays_kPa(loops: Loops, levels_Pa: Array) -> tuple[float, ...]:
-    return tuple(level_stray(loops, levels_Pa, index) / KPA for index in range(len(levels_Pa)))
+    return tuple(stroke_stray(loops, levels_Pa, index) / KPA for index in range(len(levels_Pa)))
+
+
+def _curves_end(model: Model) -> float:
+    if model.setting is None:
+        return math.nan
+    return float(contraction_grid(model, max(model.blueprint.reach))[-1])
 
 
 def _provenance(calibration: Calibration) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mpam_calib.specimen.declaration import Geometry
 from mpam_calib.specimen.plausibility import longest_contraction
@@ -108,8 +109,23 @@ def level_stray(loops: Loops, levels_Pa: Floats, index: int) -> float:
     return float(np.quantile(np.abs(steady - levels_Pa[index]), 0.99)) if len(steady) else 0.0
 
 
+def stroke_stray(loops: Loops, levels_Pa: Floats, index: int) -> float:
+    """How far (Pa) a stroke at a level strays from it, by the median of its readings; 0 without any.
+
+    Neither a gauge's noise nor a regulator that is slow makes a stroke of another level.
+    """
+    rows = _steady_rows(loops, index)
+    pressure, stroke = loops.pressure_Pa[rows], loops.stroke[rows]
+    middles = [np.median(pressure[stroke == one]) for one in np.unique(stroke)]
+    return float(np.abs(np.array(middles) - levels_Pa[index]).max(initial=0.0))
+
+
 def _steady(loops: Loops, index: int) -> Floats:
-    return np.asarray(loops.pressure_Pa[(loops.level == index) & (np.abs(loops.branch) != 2)])
+    return np.asarray(loops.pressure_Pa[_steady_rows(loops, index)])
+
+
+def _steady_rows(loops: Loops, index: int) -> NDArray[np.bool_]:
+    return np.asarray((loops.level == index) & (np.abs(loops.branch) != 2))
 
 
 def _odd_levels(loops: Loops, levels_Pa: Floats) -> list[str]:

@@ -120,6 +120,27 @@ def test_an_unsettled_run_says_so_on_top_and_below(view: CalibrationView) -> Non
     assert "No: treat every number on this page as provisional." in words
 
 
+def test_a_muscle_with_a_tensile_test_has_the_muscle_s_page(view: CalibrationView) -> None:
+    rubber = material()
+    both = replace(
+        view,
+        bands=pd.concat([view.bands, rubber.bands]),
+        observed=pd.concat([view.observed, rubber.observed]),
+    )
+    html = calibration_page(both).render()
+    lead = words_of(html.split("<nav")[0])
+    assert "Muscle calibration" in lead and "At 250 kPa, MPAM1 pulls with" in lead
+    titles = re.findall(r'<h2 id="[^"]*">([^<]*)</h2>', html)
+    assert titles[:5] == [
+        "Force against contraction",
+        "What the simulation misses",
+        "Blocked force and free contraction",
+        "Stress against strain",
+        "What the law misses",
+    ]
+    assert html.count("<figure>") == 7
+
+
 def test_material_report() -> None:
     view = material()
     html = calibration_page(view).render()

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 from model import build
 
 from mpam_calib.report import doubts
 from mpam_calib.report.view import CalibrationView
-from mpam_calib.specimen.oddities import level_stray
+from mpam_calib.specimen.oddities import level_stray, stroke_stray
 
 from .synthetic import muscle
 
@@ -64,7 +65,7 @@ def test_a_level_that_wanders(sound: CalibrationView, level: float, stray: float
     assert (limit is not None) == told
     if limit is not None:
         assert limit.level == "bad"
-        assert limit.brief == "the pressure of the level 100 kPa wanders by 60 kPa"
+        assert limit.brief == "strokes at the level 100 kPa stray from it by up to 60 kPa"
 
 
 def test_how_far_readings_stray_from_their_level() -> None:
@@ -75,6 +76,20 @@ def test_how_far_readings_stray_from_their_level() -> None:
     assert level_stray(mixed, levels, 1) == pytest.approx(0.6 * levels[1])
     changed = replace(mixed, branch=2 * mixed.branch)  # pressurised on purpose
     assert level_stray(changed, levels, 1) == 0.0
+
+
+def test_a_stroke_strays_as_a_whole() -> None:
+    """Neither a gauge's noise nor a pressure that moves within the strokes makes them another level's."""
+    loops = build.loops(rows=60, cycles=2)
+    levels = build.specimen({}, loops).levels_Pa
+    noise = np.random.default_rng(3).standard_normal(len(loops.force_N))
+    for wandering in (0.25 * np.sin(1e3 * loops.displacement_m), 0.1 * noise):
+        stray = replace(loops, pressure_Pa=loops.pressure_Pa * (1.0 + wandering))
+        own = build.specimen({}, stray).levels_Pa
+        assert stroke_stray(stray, own, 1) < 0.05 * levels[1] < level_stray(stray, own, 1)
+    mixed = replace(loops, pressure_Pa=loops.pressure_Pa * (1.0 + 0.6 * (loops.stroke % 4 == 0)))
+    assert stroke_stray(mixed, levels, 1) == pytest.approx(0.6 * levels[1])
+    assert stroke_stray(replace(mixed, branch=2 * mixed.branch), levels, 1) == 0.0
 
 
 def test_what_check_asks_is_repeated_where_the_verdict_is_no_yes(sound: CalibrationView) -> None:

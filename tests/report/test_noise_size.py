@@ -73,6 +73,8 @@ def test_what_is_said(sound: CalibrationView) -> None:
     assert limit.brief == told
     limit = noise_size.noise_size(noisy(sound, 46.0, None, 0.8))
     assert limit is not None and limit.brief.endswith("against the declared force_sd_N = 0.8")
+    assert "went into the noise" not in limit.brief  # a declaration may be wrong as well
+    assert "Either the load cell is noisier than declared" in limit.sentence
     limit = noise_size.noise_size(noisy(sound, 2.0, 1.9, 0.5))
     assert limit is not None and limit.brief == "the load cell is noisier than declared"
 

@@ -10,6 +10,7 @@ import pytest
 from mpam_calib.report import trust
 from mpam_calib.report.numbers import significant
 from mpam_calib.report.view import CalibrationView
+from mpam_calib.report.wording import convergence_sentences
 
 from .synthetic import material, muscle
 
@@ -60,6 +61,18 @@ def test_an_unsettled_sampler_is_bad(sound: CalibrationView, changes: dict[str, 
 
 def test_the_limits_themselves_pass(sound: CalibrationView) -> None:
     assert trust.convergence(settled(sound, rhat_max=1.01, ess_bulk_min=400.0, ess_tail_min=400.0)) is None
+
+
+@pytest.mark.parametrize(("wanted", "ess", "told"), [(100.0, 150.0, False), (1000.0, 600.0, True)])
+def test_the_sample_size_is_held_against_what_the_run_was_asked_for(
+    sound: CalibrationView, wanted: float, ess: float, told: bool
+) -> None:
+    view = settled(sound, ess_bulk_min=ess, ess_tail_min=ess, ess_wanted=wanted)
+    limit = trust.convergence(view)
+    words = convergence_sentences(view.convergence)
+    assert (limit is not None) == told == words.startswith("No")
+    assert f"{wanted:.0f} is the least" in words
+    assert limit is None or f"({wanted:.0f} wanted)" in limit.sentence
 
 
 def test_separate_explanations_are_a_caution(sound: CalibrationView) -> None:
@@ -126,18 +139,6 @@ def test_wide_bands(sound: CalibrationView, factor: float, level: str | None) ->
         assert "blocked force" in limit.sentence
 
 
-def test_extrapolation_at_the_top_level_only(sound: CalibrationView) -> None:
-    bands = sound.bands.copy()
-    free = bands["quantity"] == "free_contraction"
-    bands.loc[free & (bands["pressure_kPa"] == 50.0), "extrapolated"] = True
-    assert trust.extrapolation(replace(sound, bands=bands)) is None
-    bands.loc[free, "extrapolated"] = True
-    limit = trust.extrapolation(replace(sound, bands=bands))
-    assert limit is not None
-    assert limit.level == "caution"
-    assert "free contraction at 250 kPa" in limit.sentence
-
-
 def test_a_gauge_that_makes_up_the_band_is_named(sound: CalibrationView) -> None:
     assert trust.gauge(sound) is None
     assert trust.gauge(replace(sound, pressure_bias_sd_kPa=0.1)) is None
@@ -174,3 +175,20 @@ def test_a_material_is_judged_on_its_stress() -> None:
     assert limit is not None
     assert limit.level == "bad"
     assert " Pa " in limit.sentence
+    assert "tensile_strain" in limit.sentence and "diagnose" not in limit.sentence
+
+
+def test_a_muscle_with_a_tensile_test_is_judged_in_newtons(sound: CalibrationView) -> None:
+    bands = pd.concat([sound.bands, material(n_draws=400).bands])
+    view = replace(sound, bands=bands, remainder=40.0)
+    assert [name for name, *_ in trust.headline_bands(view)] == ["blocked force", "free contraction"]
+    verdict = trust.assess(view)
+    assert verdict.level == "bad" and "wrong by about 40 N" in verdict.sentence
+
+
+def test_diagnose_is_offered_only_where_it_can_look(sound: CalibrationView) -> None:
+    """It takes loops and force maps, and refuses the rest."""
+    for observed, told in ((sound.observed, True), (sound.readings("blocked_force"), False)):
+        limit = trust.remainder(replace(sound, observed=observed, remainder=12.0))
+        assert limit is not None
+        assert ("diagnose" in limit.sentence) == told

@@ -1,4 +1,4 @@
-"""What the simulation misses: readings minus simulation along the stroke."""
+"""What the simulation misses: readings minus simulation along the stroke, or along the strain."""
 
 from __future__ import annotations
 
@@ -21,12 +21,7 @@ POINTS_ON_PAGE = 1500
 
 def draw(view: CalibrationView) -> Figure:
     """One panel for each branch, a line for each level: means over short stretches of the stroke."""
-    if view.tensile:
-        readings = view.readings("tensile").assign(branch="mean", level_kPa=0.0)
-    else:
-        readings = view.readings("loops", "force_map")
-    readings = readings[~readings["censored"].fillna(False).astype(bool)]
-    readings = readings.assign(residual=readings["force_N"] - readings["fitted_N"])
+    readings = _residuals(view.readings("loops", "force_map"))
     known = [b for b in style.BRANCH_WORDS if b in set(readings["branch"])]
     groups = [(b, readings[readings["branch"] == b]) for b in known]
     rest = readings[~readings["branch"].isin(known)]
@@ -38,25 +33,43 @@ def draw(view: CalibrationView) -> Figure:
         figure = style.new_figure(3.3)
         axes = figure.subplots(1, max(len(groups), 1), sharey=True, squeeze=False)[0]
         for ax, (branch, rows) in zip(axes, groups, strict=False):
-            _panel(ax, view, rows, colours, POINTS_ON_PAGE // len(groups))
-            ax.set_title("" if view.tensile else style.BRANCH_WORDS.get(branch, "all readings"))
-            ax.set_xlabel("strain" if view.tensile else "contraction (% of the length at rest)")
-        axes[0].set_ylabel(f"reading − simulation ({'Pa' if view.tensile else 'N'})")
-        if not view.tensile:
-            _label_levels(axes[-1], levels, colours)
+            _panel(ax, rows, colours, POINTS_ON_PAGE // len(groups), view.noise, 100.0)
+            ax.set_title(style.BRANCH_WORDS.get(branch, "all readings"))
+            ax.set_xlabel("contraction (% of the length at rest)")
+        axes[0].set_ylabel("reading − simulation (N)")
+        _label_levels(axes[-1], levels, colours)
     return figure
+
+
+def draw_stress(view: CalibrationView) -> Figure:
+    """A tensile test's readings minus its law; the noise (Pa) is known where there is no muscle beside it."""
+    readings = _residuals(view.readings("tensile")).assign(level_kPa=0.0)
+    with style.applied():
+        figure = style.new_figure(3.3)
+        ax = figure.subplots()
+        noise = view.noise if view.tensile else math.nan
+        _panel(ax, readings, style.level_colours([0.0]), POINTS_ON_PAGE, noise, 1.0)
+        ax.set_xlabel("strain")
+        ax.set_ylabel("reading − simulation (Pa)")
+    return figure
+
+
+def _residuals(readings: pd.DataFrame) -> pd.DataFrame:
+    readings = readings[~readings["censored"].fillna(False).astype(bool)]
+    return readings.assign(residual=readings["force_N"] - readings["fitted_N"])
 
 
 def _panel(
     ax: Axes,
-    view: CalibrationView,
     rows: pd.DataFrame,
     colours: dict[float, tuple[float, float, float, float]],
     points: int,
+    noise: float,
+    scale: float,
 ) -> None:
-    scale = 1.0 if view.tensile else 100.0
-    if math.isfinite(view.noise):
-        ax.axhspan(-view.noise, view.noise, color="#eceff3", linewidth=0)
+    """``scale`` multiplies the contraction or strain; ``noise`` in the unit of the readings."""
+    if math.isfinite(noise):
+        ax.axhspan(-noise, noise, color="#eceff3", linewidth=0)
     ax.axhline(0.0, color=style.GREY, linewidth=0.8)
     for level, group in rows.groupby("level_kPa", sort=True):
         colour = colours[cast(float, level)]

@@ -1,0 +1,85 @@
+"""What is said of numbers that the readings do not reach."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mpam_calib.report import reach
+from mpam_calib.report.calibration import calibration_page
+from mpam_calib.report.trust import assess
+from mpam_calib.report.view import CalibrationView
+
+from .synthetic import muscle
+
+
+@pytest.fixture(scope="module")
+def sound() -> CalibrationView:
+    return muscle(n_draws=400)
+
+
+def flagged(view: CalibrationView, quantity: str, *levels: float) -> CalibrationView:
+    """The view with a number marked as outside the readings at some levels."""
+    bands = view.bands.copy()
+    rows = (bands["quantity"] == quantity) & bands["pressure_kPa"].isin(levels)
+    bands.loc[rows, "extrapolated"] = True
+    return replace(view, bands=bands)
+
+
+def cut(view: CalibrationView, share: float, free: float = 0.0) -> CalibrationView:
+    """Loops that end at a share of the free contraction, and free contractions read at 0, 1, ... of it."""
+    top = view.at_level("free_contraction", 250.0)
+    assert top is not None
+    loops = view.observed[view.observed["contraction"] <= share * top["mean"]]
+    row = {"kind": "free_contraction", "level_kPa": 250.0, "pressure_kPa": 250.0, "censored": False}
+    read = pd.DataFrame([row | {"contraction": free * top["mean"]}] if free else [])
+    return replace(view, observed=pd.concat([loops, read]))
+
+
+def test_only_the_top_level_counts(sound: CalibrationView) -> None:
+    low, high = (flagged(cut(sound, 0.5), "free_contraction", level) for level in (50.0, 250.0))
+    assert reach.extrapolation(low) is None
+    limit = reach.extrapolation(high)
+    assert limit is not None and limit.level == "caution"
+    assert "free contraction at 250 kPa" in limit.sentence
+
+
+@pytest.mark.parametrize(
+    ("share", "free", "told"),
+    [
+        (0.97, 0.0, ""),
+        (0.75, 0.0, "The readings go to 75 % of the free contraction"),
+        (0.0, 0.0, "No reading comes near the free contraction"),
+        (0.5, 0.98, ""),  # the free contraction itself was read
+        (-1.0, 0.98, ""),  # and nothing else
+    ],
+)
+def test_how_far_the_readings_go_is_said_where_more_than_a_tenth_is_unseen(
+    sound: CalibrationView, share: float, free: float, told: str
+) -> None:
+    view = flagged(cut(sound, share, free), "free_contraction", 250.0)
+    limit = reach.extrapolation(view)
+    assert (limit.sentence if limit else "").startswith(told)
+    assert (limit is not None) == bool(told)
+    assert ("nothing is extrapolated by more than 10 %" in assess(view).reasons[-1]) != bool(told)
+
+
+def test_a_pressure_beyond_the_readings(sound: CalibrationView) -> None:
+    limit = reach.extrapolation(flagged(sound, "blocked_force_N", 250.0))
+    assert limit is not None and limit.brief == "the blocked force is extrapolated"
+
+
+def test_a_band_that_ends_where_the_curves_do(sound: CalibrationView) -> None:
+    row = sound.at_level("free_contraction", 250.0)
+    assert row is not None
+    assert reach.cut_off(sound) is None
+    assert reach.cut_off(replace(sound, curves_end=float(row["q95"]) + 0.01)) is None
+    ended = replace(sound, curves_end=float(row["q95"]))
+    limit = reach.cut_off(ended)
+    assert limit is not None and limit.level == "caution"
+    assert f"up to a contraction of {100 * np.round(row['q95'], 3):.3g} %" in limit.sentence
+    assert "the upper end is where the curves end" in calibration_page(ended).render()
+    assert "where the curves end" not in calibration_page(sound).render()
