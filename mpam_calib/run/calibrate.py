@@ -17,6 +17,18 @@ from mpam_calib.run.replaced import tell_replaced
 from mpam_calib.specimen import read
 
 
+def _told_first(run: Path, tell: Listener) -> Listener:
+    """A listener that says whose page goes once there are steps: until then data may be refused."""
+    notes = iter([run])
+
+    def listener(progress: Progress) -> None:
+        if progress.steps and next(notes, None):
+            tell_replaced(run, "calibration")
+        tell(progress)
+
+    return listener
+
+
 @dataclass(frozen=True)
 class Outcome:
     """How a run ended: whether it converged, and whether an earlier result was kept."""
@@ -60,7 +72,6 @@ def calibrate_to_folder(
         cut = bool(state["sampling"].get("cut", False))
         if max_steps <= used or (state["converged"] and not cut):
             return Outcome(bool(state["converged"]), kept=True)
-    tell_replaced(run, "calibration")
     tell = listener or (lambda progress: None)
     tell(Progress("fitting", 0, float("nan"), 0.0, 0.0))
     with folder.checkpoint.resumable():
@@ -72,7 +83,7 @@ def calibrate_to_folder(
             options=options,
             material=material,
             checkpoint=folder.checkpoint,
-            listener=listener,
+            listener=_told_first(run, tell),
         )
     figures = calibration.sampling.diagnostics
     ess = float(min(figures.ess_bulk.min(), figures.ess_tail.min()))

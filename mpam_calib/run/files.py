@@ -12,6 +12,7 @@ import pandas as pd
 from mpam_calib.errors import InputError
 from mpam_calib.posterior.checkpoint import write_atomically
 from mpam_calib.posterior.stored import POSTERIOR, RUN_FILE
+from mpam_calib.specimen.recording import Specimen
 from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 
 KEPT_FILE = "kept.json"
@@ -50,6 +51,12 @@ def demand_folder(path: Path, *replaces: str) -> None:
         raise InputError(there, "a file", "a folder to make the run in")
     if not os.access(there, os.W_OK | os.X_OK):
         raise InputError(there, "a folder that may not be written", "one that may")
+
+
+def demand_forces(specimen: Specimen, expected: str) -> None:
+    """Raise ``InputError`` where there are no forces along a stroke, before anything else is told."""
+    if specimen.loops is None and specimen.force_map is None:
+        raise InputError(specimen.folder / SPECIMEN_FILE, "no loops and no force map", expected)
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:

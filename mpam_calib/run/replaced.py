@@ -1,4 +1,4 @@
-"""A folder holds one page: whose page a command is about to replace is told before it starts."""
+"""A folder holds one page: whose page a command is about to replace is told as soon as it will not refuse."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from mpam_calib.criticism.select import Selection, select
 from mpam_calib.posterior.material import demand_other, material_of
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.report.selection import selection_page
-from mpam_calib.run.files import KEPT_FILE, demand_folder, write_csv
+from mpam_calib.run.files import KEPT_FILE, demand_folder, demand_forces, write_csv
 from mpam_calib.run.folder import run_digest
 from mpam_calib.run.kept import Kept
 from mpam_calib.run.replaced import tell_replaced
@@ -32,6 +32,7 @@ def select_to_folder(
     What an interruption has left is gone on with. Raises ``InputError`` before anything is written.
     """
     specimen = read(source)
+    demand_forces(specimen, "one to select on")
     demand_folder(run, RUN_FILE, KEPT_FILE)
     demand_other(specimen, run)
     material = material_of(specimen)

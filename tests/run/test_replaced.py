@@ -1,16 +1,20 @@
-"""Whose page a command is about to replace is told before it starts."""
+"""Whose page a command is about to replace is told before that is done, and nothing where it refuses."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import NoReturn
 
+import numpy as np
 import pytest
 
+from mpam_calib.errors import InputError
+from mpam_calib.posterior.sampling import Listener, Progress
 from mpam_calib.run.kept import Kept
 from mpam_calib.run.replaced import page_owner, tell_replaced
 
 from .command import Here
+from .small import LEVELS, Specimen, csv_text
 
 
 def finish(folder: Path, command: str, result: str) -> None:
@@ -50,7 +54,9 @@ def test_only_another_command_s_page_is_told(tmp_path: Path, capsys: pytest.Capt
 def test_a_command_says_so_before_it_starts(
     command: str, own: str, muscle: Path, run_copy: Path, here: Here, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def stop(*arguments: object, **options: object) -> NoReturn:
+    def stop(*arguments: object, listener: Listener | None = None, **options: object) -> NoReturn:
+        for _ in range(2 * (listener is not None)):
+            listener(Progress("sampling", 1, 1.0, 1.0, 0.1))
         raise KeyboardInterrupt
 
     monkeypatch.setattr(f"mpam_calib.run.{command}.{command}", stop)
@@ -60,3 +66,21 @@ def test_a_command_says_so_before_it_starts(
         owner = "selection"
     lines = here(command, muscle, "-o", run_copy).err.splitlines()
     assert lines[0] == f"note: {run_copy / 'report.html'} is of a {owner}; this {own} will replace it"
+    assert len(lines) == 2
+
+
+@pytest.mark.parametrize("command", ["select", "diagnose", "calibrate"])
+def test_a_command_that_refuses_replaces_nothing_and_says_nothing_of_it(
+    command: str, run_copy: Path, tmp_path: Path, here: Here, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*arguments: object, listener: Listener, **options: object) -> NoReturn:
+        listener(Progress("warming up", 0, 1.0, 1.0, 0.0))
+        raise InputError("the data", "no finite probability", "readings")
+
+    monkeypatch.setattr("mpam_calib.run.calibrate.calibrate", refuse)
+    finish(run_copy, "select" if command == "calibrate" else "diagnose", "models.csv")
+    blocked = csv_text({"pressure_kPa": np.array(LEVELS), "force_N": np.array([9.0, 14.0, 19.0])})
+    specimen = Specimen().write(tmp_path / "blocked", blocked_force=blocked)
+    result = here(command, specimen, "-o", run_copy)
+    assert result.code == 2
+    assert result.complaint.startswith("error: ")
