@@ -15,6 +15,7 @@ from mpam_calib.model.effect import effect
 from mpam_calib.model.priors import Parameter
 from mpam_calib.report import wording
 from mpam_calib.report.figures import misfit
+from mpam_calib.report.measurements import not_tested, shown_by, telling
 from mpam_calib.report.numbers import probability, significant, with_band
 from mpam_calib.report.page import (
     Block,
@@ -97,10 +98,14 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
         Section("Misfit budget", _budget(found, content)),
         Section("Where the misfit shows", _structure(content)),
         Section("Causes", _causes(causes, parameters)),
-        *([Section("What could hide unseen", _limits(content, parameters))] if content["limits"] else []),
-        Section("What else could it be", _alternatives(content, found)),
+        *(
+            [Section("What could hide unseen", _limits(content, parameters, specimen))]
+            if content["limits"]
+            else []
+        ),
+        Section("What else could it be", _alternatives(content, found, specimen)),
         Section("Gain on data the fit never saw", _gain(content)),
-        Section("What these data cannot test", _not_tested(content)),
+        Section("What these data cannot test", not_tested(content, specimen)),
         Section("Simulation", [Text(wording.simulation_sentence(specimen.simulation))]),
     ]
     return Page(specimen.name, "Diagnosis: what the simulation gets wrong", lead, sections)
@@ -290,7 +295,7 @@ def _meaning(identifier: str, form: str) -> str:
     return f"{item.sentence} ({'; '.join(words)})" if words else item.sentence
 
 
-def _alternatives(content: dict[str, Any], found: Diagnosis) -> list[Block]:
+def _alternatives(content: dict[str, Any], found: Diagnosis, specimen: Specimen) -> list[Block]:
     near, shown = found.verdict.near(), found.verdict.likeliest()
     text = (
         f"Other sets within {BESIDE:g} nats of the likeliest (a factor of "
@@ -305,14 +310,16 @@ def _alternatives(content: dict[str, Any], found: Diagnosis) -> list[Block]:
         {
             "set": ", ".join(a["ids"]) or "nothing beyond the declared simulation",
             "probability": probability(a["probability"]),
-            "what would tell them apart": _telling(set(a["ids"]), {c["id"] for c in content["causes"]}),
+            "what would tell them apart": telling(
+                set(a["ids"]), {c["id"] for c in content["causes"]}, specimen
+            ),
         }
         for a in content["alternatives"][:shown]
     ]
     return [Text(text), DataTable(pd.DataFrame(rows), "Other sets of causes", {"probability": "{}"})]
 
 
-def _limits(content: dict[str, Any], parameters: dict[str, Parameter]) -> list[Block]:
+def _limits(content: dict[str, Any], parameters: dict[str, Parameter], specimen: Specimen) -> list[Block]:
     """How large each effect could be without being seen."""
     found = "Beside the causes named nothing was found" if content["causes"] else "Nothing was found"
     text = (
@@ -340,20 +347,13 @@ def _limits(content: dict[str, Any], parameters: dict[str, Parameter]) -> list[B
             "5 %": significant(band["q05"], 2),
             "95 %": significant(band["q95"], 2),
             "unit": parameters[name].printed_unit,
-            "what would show it": effect(limit["id"]).told_by,
+            "what would show it": shown_by(limit["id"], specimen),
         }
         for limit in content["limits"]
         for name, band in limit["parameters"].items()
     ]
     formats = dict.fromkeys(["5 %", "95 %"], "{}")
     return [Text(text), DataTable(pd.DataFrame(rows), "Sizes that these data leave room for", formats)]
-
-
-def _telling(one: set[str], other: set[str]) -> str:
-    """The measurement for the first effect in which two sets differ: one that either set claims."""
-    return next(
-        (effect(e).told_by for e in [*sorted(one - other), *sorted(other - one)] if effect(e).told_by), ""
-    )
 
 
 def _gain(content: dict[str, Any]) -> list[Block]:
@@ -388,13 +388,3 @@ def _gain(content: dict[str, Any]) -> list[Block]:
         Text(text),
         DataTable(table, "Before and after, held out", dict.fromkeys(table.columns[1:], "{:.3g}")),
     ]
-
-
-def _not_tested(content: dict[str, Any]) -> list[Block]:
-    if not content["not_tested"]:
-        return [Text("Every effect of the catalogue could be tested.")]
-    rows = [
-        {"effect": effect(n["id"]).title, "why not": n["why"], "what would show it": effect(n["id"]).told_by}
-        for n in content["not_tested"]
-    ]
-    return [DataTable(pd.DataFrame(rows), "Effects that these data are silent on", None)]

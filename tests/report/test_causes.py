@@ -100,7 +100,7 @@ def test_other_sets_are_counted_without_a_word_that_the_table_contradicts() -> N
     alternatives = [{"ids": ["dead_band", "presliding"], "probability": 1e-4}]
     content: dict[str, Any] = {"alternatives": alternatives, "causes": [{"id": "dead_band"}]}
     found: Any = SimpleNamespace(verdict=verdict)
-    text, _ = _alternatives(content, found)
+    text, _ = _alternatives(content, found, specimen_of("develop-null-006"))
     assert isinstance(text, Text)
     assert "within 10 nats of the likeliest (a factor of 22,000 in probability): 4." in text.html
     assert "hardly" not in text.html

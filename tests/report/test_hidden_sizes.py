@@ -34,7 +34,7 @@ def test_a_band_of_either_sign_that_excludes_zero_is_pointed_out(
             {"id": "rig_compliance", "parameters": {compliance: {"q05": 1e-6, "q95": 1e-4}}},
         ],
     }
-    text = _limits(content, parameters)[0]
+    text = _limits(content, parameters, specimen_of("develop-null-006"))[0]
     assert isinstance(text, Text)
     assert ("length offset" in text.html) == named
     assert "compliance" not in text.html

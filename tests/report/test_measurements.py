@@ -1,0 +1,47 @@
+"""Measurements that the diagnosis page asks for: none that was made already."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from mpam_calib.model.effect import effect
+from mpam_calib.report.diagnosis import _alternatives, _limits
+from mpam_calib.report.measurements import not_tested, shown_by, telling
+from mpam_calib.report.page import Block, DataTable
+
+ORDER = "order_too_low"
+TEST = effect(ORDER).told_by
+
+
+def words_of(blocks: list[Block]) -> str:
+    return " ".join(
+        str(cell) for block in blocks if isinstance(block, DataTable) for row in block.rows for cell in row
+    )
+
+
+@pytest.mark.parametrize("tested", [False, True])
+def test_a_tensile_test_is_asked_for_where_there_is_none(tested: bool) -> None:
+    specimen: Any = SimpleNamespace(tensile=object() if tested else None)
+    assert (shown_by(ORDER, specimen) == TEST) != tested
+    assert (telling({ORDER}, set(), specimen) == TEST) != tested
+    assert telling(set(), {"creep", ORDER}, specimen) == effect("creep").told_by
+    assert telling(set(), set(), specimen) == ""
+    content: dict[str, Any] = {
+        "causes": [],
+        "alternatives": [{"ids": [ORDER], "probability": 0.1}],
+        "not_tested": [{"id": ORDER, "why": "one level"}],
+        "limits": [{"id": ORDER, "parameters": {"next_order": {"q05": -0.1, "q95": 0.1}}}],
+    }
+    found: Any = SimpleNamespace(verdict=SimpleNamespace(near=lambda: 1, likeliest=lambda: 1))
+    parameter: Any = SimpleNamespace(prior=SimpleNamespace(from_normal=abs), printed_unit="")
+    pages = (
+        _alternatives(content, found, specimen),
+        _limits(content, {"next_order": parameter}, specimen),
+        not_tested(content, specimen),
+    )
+    for blocks in pages:
+        assert (TEST in words_of(blocks)) != tested
+        assert ("the tensile test, fitted at a higher order" in words_of(blocks)) == tested
