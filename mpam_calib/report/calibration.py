@@ -141,6 +141,8 @@ def _pressure_section(view: CalibrationView) -> Section:
         "Line: median. Dark and light band: 50 % and 90 %. Dots: the levels of the data; hollow where "
         "the readings end before." + (" Crosses: readings of the test itself." if measured else "")
     )
+    if any(endless(view, view.at_level("free_contraction", level)) for level in view.levels_kPa):
+        caption += f" A band that goes up to {100 * view.curves_end:.3g} % ends only where the curves end."
     levels = pd.DataFrame([_level_row(view, level) for level in sorted(float(x) for x in view.levels_kPa)])
     right = dict.fromkeys(levels.columns, "{}")
     return Section(

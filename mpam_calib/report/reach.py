@@ -36,7 +36,7 @@ def extrapolation(view: CalibrationView) -> Limit | None:
 def cut_off(view: CalibrationView) -> Limit | None:
     """The free contraction's band ends where the curves do."""
     free = view.at_level("free_contraction", view.top_level_kPa)
-    if free is None or not endless(view, free):
+    if not endless(view, free):
         return None
     sentence = (
         "Some of the plausible curves pull wherever they were looked at, up to a contraction of "
@@ -59,6 +59,6 @@ def _unseen(view: CalibrationView, free: pd.Series) -> str:
     return f"The readings go to {100 * furthest / free['mean']:.0f} % of the free contraction"
 
 
-def endless(view: CalibrationView, free: pd.Series) -> bool:
+def endless(view: CalibrationView, free: pd.Series | None) -> bool:
     """Whether a free contraction's band ends where the curves do, some of which have no root."""
-    return bool(free["q95"] >= view.curves_end - 1e-9)
+    return free is not None and bool(free["q95"] >= view.curves_end - 1e-9)

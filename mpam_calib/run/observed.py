@@ -67,16 +67,17 @@ def _bins_frame(bins: LoopBins, calibration: Calibration, draws: Draws) -> tuple
     A bin's reading is a mean over its width: so is what it is compared with, or a curve's bend would look
     like a misfit.
     """
-    middle = bins.middle()
-    fitted, left = fitted_force(calibration.model, draws, bins.readings)
+    middle, halves = bins.middle(), (slice(len(bins)), slice(len(bins), None))
+    places = [bins.readings.take(half) for half in halves]
+    fitted, left = np.mean([fitted_force(calibration.model, draws, place) for place in places], axis=0)
     rough = float(np.mean(draws.values[ROUGH] ** 2)) if ROUGH in draws.values else 0.0
     frame = _frame("loops", middle, bins.force, bins.slack, calibration)
-    low, high = _bands(calibration, bins.readings, len(bins))
+    low, high = _bands(calibration, places)
     frame = frame.assign(
         stroke=bins.segment, time_s=middle.time, cycle=middle.cycle,
-        fitted_N=_means(fitted, len(bins)), low_N=low, high_N=high,
+        fitted_N=fitted, low_N=low, high_N=high,
     )  # fmt: skip
-    return frame, (_means(left, len(bins)) + rough)[~bins.slack]
+    return frame, (left + rough)[~bins.slack]
 
 
 def _points_frames(
@@ -86,7 +87,7 @@ def _points_frames(
     model, guide = calibration.model, calibration.target.guide
     assert model.setting is not None
     fitted, left = fitted_force(model, draws, points.readings)
-    low, high = _bands(calibration, points.readings, len(points))
+    low, high = _bands(calibration, [points.readings])
     found = []
     for number in np.unique(points.kind):
         rows = points.kind == number
@@ -102,29 +103,24 @@ def _points_frames(
     return found
 
 
-def _means(values: Array, count: int) -> Array:
-    """Means (..., count) over the places of each reading, values (..., places × count)."""
-    return np.asarray(values.reshape(*values.shape[:-1], -1, count).mean(axis=-2))
+def _bands(calibration: Calibration, places: list[Readings]) -> tuple[Array, Array]:
+    """Ends (n,), N, of the 90 % band of a new reading where, and at the pressure at which, each was made.
 
-
-def _bands(calibration: Calibration, places: Readings, count: int) -> tuple[Array, Array]:
-    """Ends (count,), N, of the 90 % band of a new reading where, and at the pressure at which, each was made.
-
-    Each reading is a mean over places, all first ones first.
+    Each reading is a mean over its places.
     """
     model, draws = calibration.model, calibration.draws.thin(BAND_DRAWS)
     assert model.setting is not None
-    size = max(1, BATCH_CELLS // len(places))
-    parts = []
-    for i in range(0, len(draws), size):
-        values = {k: v[i : i + size] for k, v in draws.values.items()}
-        parts.append(_means(predict_force(model, values, draws.eta[i : i + size], places), count))
-    force = np.concatenate(parts)
+    noise = ReadingNoise(draws.values, model.setting.force_scale)
     rng = np.random.default_rng([calibration.seed, 12])
-    if ROUGH in draws.values:
-        force = force + draws.values[ROUGH] * rng.standard_normal(force.shape)
-    seen = force + ReadingNoise(draws.values, model.setting.force_scale).draw(force, rng)
-    low, high = np.quantile(seen, [0.05, 0.95], axis=0)
+    size = max(1, BATCH_CELLS // len(draws))
+    ends = []
+    for i in range(0, len(places[0]), size):
+        some = [place.take(slice(i, i + size)) for place in places]
+        force = np.mean([predict_force(model, draws.values, draws.eta, place) for place in some], axis=0)
+        if ROUGH in draws.values:
+            force = force + draws.values[ROUGH] * rng.standard_normal(force.shape)
+        ends.append(np.quantile(force + noise.draw(force, rng), [0.05, 0.95], axis=0))
+    low, high = np.concatenate(ends, axis=1)
     return low, high
 
 

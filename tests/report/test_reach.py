@@ -81,5 +81,7 @@ def test_a_band_that_ends_where_the_curves_do(sound: CalibrationView) -> None:
     limit = reach.cut_off(ended)
     assert limit is not None and limit.level == "caution"
     assert f"up to a contraction of {100 * np.round(row['q95'], 3):.3g} %" in limit.sentence
-    assert "the upper end is where the curves end" in calibration_page(ended).render()
+    page = calibration_page(ended).render()
+    assert "the upper end is where the curves end" in page
+    assert "ends only where the curves end." in page
     assert "where the curves end" not in calibration_page(sound).render()

@@ -59,5 +59,5 @@ def test_a_mean_of_readings_is_compared_with_the_mean_of_the_fit(
     draws = calibration.draws.thin(DRAWS)
     ends, middle = (fitted_force(calibration.model, draws, r)[0] for r in (bins.readings, bins.middle()))
     mean = ends.reshape(2, -1).mean(axis=0)
-    np.testing.assert_allclose(observed["fitted_N"], mean)
+    np.testing.assert_allclose(observed["fitted_N"], mean, rtol=1e-9)
     assert np.abs(mean - middle).max() > 1e-3
