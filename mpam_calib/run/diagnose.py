@@ -34,7 +34,6 @@ def diagnose_to_folder(
     What an interruption has left is gone on with. Raises ``InputError`` before anything is written.
     """
     specimen = read(source)
-    demand_forces(specimen, "one to diagnose")
     demand_folder(run, RUN_FILE, KEPT_FILE)
     demand_other(specimen, run)
     material = material_of(specimen)
@@ -44,6 +43,7 @@ def diagnose_to_folder(
     if kept.finished():
         return None
     _demand_extended(source, run)
+    demand_forces(specimen, "one to diagnose")
     tell_replaced(run, "diagnosis")
     with kept.unfinished.resumable():
         found = diagnose(specimen, material=material, tell=tell, journal=Journal(kept.unfinished))

@@ -32,7 +32,6 @@ def select_to_folder(
     What an interruption has left is gone on with. Raises ``InputError`` before anything is written.
     """
     specimen = read(source)
-    demand_forces(specimen, "one to select on")
     demand_folder(run, RUN_FILE, KEPT_FILE)
     demand_other(specimen, run)
     material = material_of(specimen)
@@ -42,6 +41,7 @@ def select_to_folder(
     kept = Kept(run, "select", digest, FILES)
     if kept.finished():
         return None
+    demand_forces(specimen, "one to select on")
     tell_replaced(run, "selection")
     journal = Journal(kept.unfinished)
     with kept.unfinished.resumable():
