@@ -14,7 +14,7 @@ from mpam_calib.run.kept import Kept
 from mpam_calib.run.replaced import page_owner, tell_replaced
 
 from .command import Here
-from .small import LEVELS, Specimen, csv_text
+from .small import Specimen, csv_text
 
 
 def finish(folder: Path, command: str, result: str) -> None:
@@ -78,9 +78,12 @@ def test_a_command_that_refuses_replaces_nothing_and_says_nothing_of_it(
         raise InputError("the data", "no finite probability", "readings")
 
     monkeypatch.setattr("mpam_calib.run.calibrate.calibrate", refuse)
-    finish(run_copy, "select" if command == "calibrate" else "diagnose", "models.csv")
-    blocked = csv_text({"pressure_kPa": np.array(LEVELS), "force_N": np.array([9.0, 14.0, 19.0])})
+    if command == "calibrate":
+        finish(run_copy, "select", "models.csv")
+    pressure = np.linspace(100.0, 200.0, 9)
+    blocked = csv_text({"pressure_kPa": pressure, "force_N": 0.1 * pressure})
     specimen = Specimen().write(tmp_path / "blocked", blocked_force=blocked)
     result = here(command, specimen, "-o", run_copy)
     assert result.code == 2
     assert result.complaint.startswith("error: ")
+    assert ("no finite probability" if command == "calibrate" else "no loops") in result.complaint
