@@ -12,6 +12,8 @@ from model import build
 from mpam_calib.calibration import Calibration, calibrate
 from mpam_calib.prediction.fitted import fitted_force
 from mpam_calib.run.observed import DRAWS, observed_readings
+from mpam_calib.run.view import view_of
+from mpam_calib.specimen.oddities import stroke_stray
 from mpam_calib.units import KPA
 
 from .small import K_F, L0, static_force
@@ -30,6 +32,7 @@ def calibration() -> Calibration:
     return calibrate(
         replace(made, sensors=made.sensors.model_copy(update={"force_sd_N": NOISE_N})),
         max_steps=60,
+        ess_wanted=150.0,
         options=build.PLAIN,
     )
 
@@ -61,3 +64,15 @@ def test_a_mean_of_readings_is_compared_with_the_mean_of_the_fit(
     mean = ends.reshape(2, -1).mean(axis=0)
     np.testing.assert_allclose(observed["fitted_N"], mean, rtol=1e-9)
     assert np.abs(mean - middle).max() > 1e-3
+
+
+def test_the_page_has_the_run_s_own_demands_and_ends(calibration: Calibration) -> None:
+    bands = calibration.bands()
+    view = view_of(calibration, bands)
+    assert view.convergence.ess_wanted == 150.0
+    loops, levels = calibration.specimen.loops, calibration.specimen.levels_Pa
+    assert loops is not None
+    strays = [stroke_stray(loops, levels, index) / KPA for index in range(3)]
+    np.testing.assert_allclose(view.strays_kPa, strays)
+    grid = bands.loc[bands["quantity"] == "force_N", "contraction"]
+    assert grid.max() <= view.curves_end < 0.6
