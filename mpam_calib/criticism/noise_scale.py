@@ -27,13 +27,16 @@ LOG_SCALES = np.linspace(-0.8, 0.8, 17)
 """Logarithms of the scales that are tried."""
 WINDOWS_SD = 0.35
 """Standard deviation of the logarithm of the noise's sd as the windows give it."""
+FLEXIBLE = ("free", "linear", "constant")
+"""The law of the models that are asked: the first that a space has (of few levels it has no free one)."""
 MOST_ORDER = 5
 """Highest order of the models that are asked."""
 
 
 def settle_noise(problem: Problem, space: Sequence[Simulation]) -> Problem:
     """The problem with its noise scaled as the most probable flexible model of a space asks."""
-    flexible = [s for s in space if s.law == "free" and s.order <= MOST_ORDER] or list(space)
+    law = next((law for law in FLEXIBLE if any(s.law == law for s in space)), "")
+    flexible = [s for s in space if s.law == law and s.order <= MOST_ORDER] or list(space)
     top = max(s.order for s in flexible)
     blueprints = [problem.blueprint.model_copy(update={"simulation": s}) for s in flexible if s.order == top]
     fits = [(b, found) for b in blueprints if (found := _fits(problem, b, {}))]

@@ -234,14 +234,18 @@ def _at(found: Fit | None) -> Start:
 
 
 def _rates_by_size(problem: Problem, simulation: Simulation, free: Ranked | None) -> dict[int, Rates]:
-    """What the free moduli say of the rates, by size of the remainder; nothing where there are no rates."""
+    """What the free moduli say of the rates, by size of the remainder; only where they say anything.
+
+    Of readings at L0 alone engineering strain leaves nothing.
+    """
     if free is None or not rate_names(simulation.law, simulation.order):
         return {}
     law, other = (
         chain_for(blueprint_of(problem, s).model_dump_json(), frozenset())
         for s in (simulation, free.simulation)
     )
-    return {f.size: Rates(law, other, f) for f in free.fits}
+    found = {f.size: Rates(law, other, f) for f in free.fits}
+    return {size: rates for size, rates in found.items() if len(rates.seen[1])}
 
 
 def _by_law(space: Sequence[Simulation]) -> list[dict[str, Simulation]]:

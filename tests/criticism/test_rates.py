@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from model import build
 from rig import sets
 
 from criticism.own_rates import made_with_rates_of_its_own
@@ -15,8 +16,10 @@ from mpam_calib.criticism.climb import Climb
 from mpam_calib.criticism.fit import chain_for, fit
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.criticism.rates import Rates, find_rates
+from mpam_calib.criticism.space import model_space
 from mpam_calib.criticism.spread import Alone
 from mpam_calib.model.blueprint import Blueprint
+from mpam_calib.specimen.recording import ForceMap
 
 SIZE = 1
 
@@ -123,6 +126,21 @@ def test_a_thorough_search_is_not_beaten_by_many_more_climbs(problem: Problem) -
     )
     assert found >= many - 1.0
     assert found >= quick
+
+
+def test_readings_at_rest_length_say_nothing_of_rates() -> None:
+    """Where engineering strain is nothing, and every law is ranked all the same."""
+    pressure = 1e5 * np.array([0.5, 1.0, 1.5, 2.0, 2.5])
+    none = np.zeros(5, dtype=np.int64)
+    made = build.specimen(
+        {"law": "linear", "order": 1, "friction": "none"},
+        levels_kPa=tuple(pressure / 1e3),
+        force_map=ForceMap(pressure, np.zeros(5), 4e-4 * pressure, np.arange(5), none, none.astype(bool)),
+    )
+    space = [s for s in model_space(made) if s.order == 1]
+    ranked = ranking.rank(problem_of(made), space, workers=1)
+    assert {r.simulation.law for r in ranked} == {"constant", "linear", "free", "exponential"}
+    assert len(ranked) == len(space)
 
 
 @pytest.mark.parametrize(("off", "again"), [(5.0, True), (2.0 * ranking.NEAR, False)])

@@ -122,9 +122,24 @@ def test_a_law_with_rates_of_its_own_is_climbed() -> None:
 def test_laws_in_play_are_those_that_the_levels_carry() -> None:
     recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
     specimen = specimen_of(recipe.name)
-    for count, missing in ((6, set()), (3, {"exponential_each"}), (2, {"exponential_each", "exponential"})):
+    rates = {"exponential_each", "exponential"}
+    for count, missing in (
+        (6, set()), (3, {"exponential_each"}), (2, {*rates, "free"}), (1, {*rates, "free", "linear"})
+    ):  # fmt: skip
         few = replace(specimen, levels_Pa=specimen.levels_Pa[:count])
         assert {s.law for s in space.model_space(few)} == set(space.LAWS) - missing
+
+
+@pytest.mark.parametrize(("levels", "twin"), [(1, "constant"), (2, "linear"), (3, None)])
+def test_moduli_free_at_few_levels_are_there_once(levels: int, twin: str | None) -> None:
+    """By the declared name: of one level they are a constant law's, of two a linear one's."""
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
+    specimen = specimen_of(recipe.name)
+    declared = specimen.simulation.model_copy(update={"law": "free"})
+    few = replace(specimen, levels_Pa=specimen.levels_Pa[:levels], simulation=declared)
+    models = space.model_space(few)
+    assert models.count(declared) == 1
+    assert twin not in {m.law for m in models}
 
 
 @pytest.mark.parametrize(
