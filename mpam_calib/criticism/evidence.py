@@ -37,6 +37,8 @@ SETTLES = 7
 of each modulus's own are integrated alone."""
 FEW = 4
 """Parameters up to which densities fitted to the points follow every bend."""
+FURTHEST, ALIKE = 3.0, 0.01
+"""Standard errors, and nats beside them, by which quadrature and bridge may differ: one can miss a hill."""
 OWN_RATES = "exponential_each"
 AS_DECLARED = (1.0, 1.0)
 WIDTHS = {
@@ -51,10 +53,29 @@ WIDTHS = {
 
 @dataclass(frozen=True)
 class Weighed:
-    """A model's log evidence (nats) by quadrature, and by a bridge with its standard error."""
+    """A model's log evidence (nats) by quadrature, and by a bridge; each with its standard error.
+
+    No ``bridge`` where the parameters are too many for one.
+    """
 
     quadrature: float
-    bridge: Bridge
+    error: float
+    bridge: Bridge | None
+
+    @property
+    def difference(self) -> float:
+        """Nats between the two; NaN where there is no bridge that is to be relied on."""
+        if self.bridge is None or not self.bridge.reliable:
+            return float("nan")
+        return abs(self.bridge.value - self.quadrature)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the bridge is to be relied on, and its figure within the errors of both."""
+        if self.bridge is None:
+            return False
+        error = np.hypot(self.bridge.error, np.nan_to_num(self.error))
+        return bool(self.difference <= FURTHEST * error + ALIKE)
 
 
 def log_evidence_beyond_laplace(
@@ -83,14 +104,15 @@ def weigh(problem: Problem, blueprint: Blueprint, fits: list[Fit], seed: int) ->
 
     For models of at most SETTLES parameters.
     """
-    terms, inner = _sizes(problem, blueprint, fits)
+    terms, inner = _sizes(problem, blueprint, fits, rule=_expanded)
     quadrature = float(np.logaddexp.reduce(list(terms.values())))
+    own = _error(terms, {size: found.error for size, (_, found) in inner.items()})
     if not inner:
-        return Weighed(quadrature, Bridge(quadrature, float("inf")))
+        return Weighed(quadrature, own, Bridge(quadrature, float("inf")))
     bridges = {size: bridge_evidence(density, found, seed) for size, (density, found) in inner.items()}
     error = _error(terms, {size: bridge.error for size, bridge in bridges.items()})
     terms |= {size: bridge.value + log(SIZE_PRIOR[size]) for size, bridge in bridges.items()}
-    return Weighed(quadrature, Bridge(float(np.logaddexp.reduce(list(terms.values()))), error))
+    return Weighed(quadrature, own, Bridge(float(np.logaddexp.reduce(list(terms.values()))), error))
 
 
 def under_other_priors(problem: Problem, blueprint: Blueprint, fits: list[Fit], known: float) -> list[float]:
@@ -100,7 +122,8 @@ def under_other_priors(problem: Problem, blueprint: Blueprint, fits: list[Fit], 
     """
 
     def total(widths: tuple[float, float], worth: float = -np.inf) -> float:
-        return float(np.logaddexp.reduce(list(_sizes(problem, blueprint, fits, widths, worth)[0].values())))
+        terms, _ = _sizes(problem, blueprint, fits, widths, worth, rule=_expanded)
+        return float(np.logaddexp.reduce(list(terms.values())))
 
     if many_parameters(fits):
         laplace = np.array([total(widths, worth=np.inf) for widths in WIDTHS.values()])

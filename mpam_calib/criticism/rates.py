@@ -115,7 +115,9 @@ class Rates:
         if len(self.names) < 2 * order:
             slopes = slopes.sum(axis=2, keepdims=True)
         quadratic = sum(np.sum(part**2, axis=1) for part in (residual, best, rates))
-        return Place(rates, X, best, residual, slopes.reshape(B, len(seen), len(self.names)), -0.5 * quadratic)
+        return Place(
+            rates, X, best, residual, slopes.reshape(B, len(seen), len(self.names)), -0.5 * quadratic
+        )
 
     def moduli(self, rates: Array) -> Array:
         """The moduli at the levels for unit coordinates of the law, (B, L·order, p)."""

@@ -32,7 +32,6 @@ from mpam_calib.criticism.space import model_space
 from mpam_calib.criticism.spread import held_problem
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
-from mpam_calib.posterior.bridge import Bridge
 from mpam_calib.specimen.declaration import Simulation
 from mpam_calib.specimen.recording import Specimen
 
@@ -57,7 +56,8 @@ class Selection:
     levels left out and by the declared one (``model``: "first", "held out", "declared"; then LEVEL_COLUMNS).
     ``confusion`` (k, k): share of replicates simulated from row's model in which column's won; NaN where
     there were none. ``sensitivity``: their evidences and shares under other prior widths, a row for each
-    model and width. ``disagreement`` (nats): the largest difference between quadrature and bridge among them.
+    model and width. ``disagreement`` (nats): the largest difference between quadrature and bridge among them;
+    NaN where none was bridged.
     """
 
     models: pd.DataFrame
@@ -98,6 +98,10 @@ def select(
             tell=listener,
             always=lambda simulation: declared_or_beside(simulation, declared),
         )
+        if not ranked:
+            raise InputError(
+                specimen.folder / "specimen.toml", "data that none of the models can be fitted to", "others"
+            )
         listener("bridging", 0.0)
         weighed = list(spread(_weigh, [(r, seed) for r in ranked[:CONFUSED]]))
         known = {r.simulation.model_dump_json(): w.quadrature for r, w in zip(ranked, weighed, strict=False)}
@@ -122,21 +126,26 @@ def select(
         confusion=confusion,
         replicates=replicates,
         sensitivity=prior_sensitivity(widened),
-        disagreement=max(abs(w.quadrature - w.bridge.value) for w in weighed),
+        disagreement=max((w.difference for w in weighed if np.isfinite(w.difference)), default=float("nan")),
     )
 
 
 def _weigh(task: tuple[Ranked, int]) -> Weighed:
     ranked, seed = task
     if many_parameters(ranked.fits):
-        return Weighed(ranked.log_evidence, Bridge(ranked.log_evidence, ranked.error))
+        return Weighed(ranked.log_evidence, ranked.error, None)
     problem = held_problem()
     return weigh(problem, blueprint_of(problem, ranked.simulation), ranked.fits, seed)
 
 
 def _bridged(ranked: Ranked, weighed: Weighed) -> Ranked:
-    """The bridge's figure with its error where it is to be believed, or else the quadrature's without."""
-    if not weighed.bridge.reliable:
+    """The bridge's figure with its error where it is to be believed, or else the quadrature's without.
+
+    One that has no bridge stays as it is.
+    """
+    if weighed.bridge is None:
+        return ranked
+    if not weighed.agrees:
         return replace(ranked, log_evidence=weighed.quadrature, error=float("nan"))
     return replace(ranked, log_evidence=weighed.bridge.value, error=weighed.bridge.error)
 

@@ -20,8 +20,9 @@ from mpam_calib.posterior.proposal import StudentMixture
 
 Array = NDArray[np.float64]
 
-DRAWS = 1000
-"""Proposed draws of the posterior, half of which fit q; and about as many draws of q as the other half."""
+DRAWS, MORE = 1000, 4
+"""Proposed draws of the posterior, half of which fit q, and about as many draws of q as the other half; and
+times as many where these do not do: of two hills, few are draws of both."""
 BURN = 0.1
 INFLATION = 1.15
 ROUNDS = 100
@@ -43,6 +44,11 @@ def bridge_evidence(density: Density, found: Evidence, seed: int, draws: int = D
     """Bridge sampling of a density whose mean and covariance are about known."""
     if len(found.mean) == 0:
         return Bridge(found.value, 0.0)
+    first = _bridge_once(density, found, seed, draws)
+    return first if first.reliable else _bridge_once(density, found, seed, MORE * draws)
+
+
+def _bridge_once(density: Density, found: Evidence, seed: int, draws: int) -> Bridge:
     rng = np.random.RandomState(np.random.SeedSequence([seed, 4]).generate_state(1)[0])
     wide = StudentMixture.build([found.mean], [INFLATION**2 * found.covariance])
     chain, log_p = independence_chain(density, wide, draws, rng)

@@ -76,6 +76,22 @@ def ranking_table(models: pd.DataFrame) -> tuple[pd.DataFrame, str]:
     return table, f" The same in all of these: {same}." if same else ""
 
 
+def evidence_text(disagreement: float) -> str:
+    """How the evidences were found; ``disagreement`` (nats) is NaN where no model was bridged."""
+    first = (
+        "Evidence of the leading models is by quadrature or, with many parameters, by annealing: no bridge "
+        "was built that is to be relied on."
+        if math.isnan(disagreement)
+        else "Evidence of the leading models with few parameters is by bridge sampling, with its error; "
+        f"quadrature differs from it by at most {disagreement:.2g} nats, and its figure stands, without an "
+        "error, where that is more than the errors of both."
+    )
+    return (
+        f"{first} That of models with a rate for each modulus is known less well. A model without an error "
+        "lies far below and has Laplace's approximation, or its bridge is not to be relied on."
+    )
+
+
 def _with_errors(models: pd.DataFrame, column: str, digits: int) -> list[str]:
     """Values "v ± error", or without what is not known."""
     found = []
@@ -104,12 +120,7 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
             "Ranking",
             [
                 DataTable(table, f"{RANKING}{same}", dict.fromkeys(FIGURES, "{}")),
-                Text(
-                    "Evidence of the leading models is by bridge sampling, with its error; quadrature "
-                    f"differs from it by at most {found.disagreement:.2g} nats. That of models with a rate "
-                    "for each modulus is known less well. A model without an error lies far below and has "
-                    "Laplace's approximation, or its bridge is not to be relied on."
-                ),
+                Text(evidence_text(found.disagreement)),
             ],
         ),
         choices_section(found.odds, found.levels),

@@ -15,11 +15,14 @@ from criticism.own_rates import made_with_rates_of_its_own
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism import ranking, space
 from mpam_calib.criticism import select as module
-from mpam_calib.criticism.fit import fit
+from mpam_calib.criticism.evidence import Weighed
+from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.odds import CHOICES
 from mpam_calib.criticism.ranking import rank
+from mpam_calib.errors import InputError
+from mpam_calib.posterior.bridge import Bridge
 from mpam_calib.report.selection import selection_page
-from mpam_calib.specimen.declaration import Noise
+from mpam_calib.specimen.declaration import Noise, Simulation
 
 
 def test_the_simulated_model_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,6 +62,40 @@ def test_held_out_levels_are_predicted_from_the_others() -> None:
     known = stats.multivariate_normal(mean, covariance)
     right, wrong = (known.logpdf(factor * problem.force[held]) for factor in (1.0, 1.1))
     assert right > wrong + 10.0
+
+
+def ranked_of(fits: list[Fit], evidence: float = -10.0, error: float = 0.2) -> ranking.Ranked:
+    return ranking.Ranked(Simulation(friction="none"), fits, evidence, error)
+
+
+@pytest.mark.parametrize(
+    ("weighed", "value", "error"),
+    [
+        (Weighed(-10.1, 0.01, Bridge(-10.12, 0.03)), -10.12, 0.03),
+        (Weighed(-10.1, 0.01, Bridge(-10.5, 0.03)), -10.1, float("nan")),
+        (Weighed(-10.1, 0.01, Bridge(-10.1, float("inf"))), -10.1, float("nan")),
+        # Annealed: its error is known, though it may be larger than a bridge's may.
+        (Weighed(-10.0, 0.2, None), -10.0, 0.2),
+    ],
+)
+def test_the_bridge_s_figure_stands_where_it_may(weighed: Weighed, value: float, error: float) -> None:
+    found = module._bridged(ranked_of([]), weighed)
+    np.testing.assert_array_equal([found.log_evidence, found.error], [value, error])
+
+
+def test_no_bridge_for_many_parameters() -> None:
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
+    one = fit(problem_of(specimen_of(recipe.name)), frozenset(), 0)
+    many = ranked_of([replace(one, u=np.zeros(8))])
+    assert module._weigh((many, 0)) == Weighed(-10.0, 0.2, None)
+
+
+def test_where_no_model_can_be_fitted_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")
+    monkeypatch.setattr(module, "settle_noise", lambda problem, space: problem)
+    monkeypatch.setattr(module, "rank_spread", lambda *given, **named: [])
+    with pytest.raises(InputError, match="none of the models can be fitted"):
+        module.select(specimen_of(recipe.name), replicates=0, workers=1)
 
 
 FIRST_SHARE = 0.9

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mpam_calib.posterior.bridge import Bridge, bridge, bridge_evidence, fitted, independence_chain
-from mpam_calib.posterior.evidence import integrate
+from mpam_calib.posterior.evidence import Evidence, integrate
 from mpam_calib.posterior.mode import evaluate
 from mpam_calib.posterior.proposal import StudentMixture
 
@@ -39,6 +39,26 @@ def test_one_seed_one_figure():
     found = integrate(density, mode_of(density, 3))
     assert bridge_evidence(density, found, 3) == bridge_evidence(density, found, 3)
     assert bridge_evidence(density, found, 3) != bridge_evidence(density, found, 4)
+
+
+class TwoHills:
+    """Two normal densities of equal weight, forty of their sds apart."""
+
+    places = np.array([[-6.0, 0.0], [6.0, 0.0]])
+    sd = np.array([0.3, 0.5])
+
+    def log_posterior(self, u: np.ndarray) -> np.ndarray:
+        z = (u[:, None, :] - self.places) / self.sd
+        return np.logaddexp.reduce(-0.5 * np.sum(z**2, axis=2), axis=1) - np.log(4.0 * np.pi * self.sd.prod())
+
+
+def test_of_two_hills_more_is_drawn():
+    """Of what a density over both draws little lies on them; four times as many do."""
+    found = Evidence(0.0, 0.0, np.zeros(2), np.diag([36.1, 0.25]))
+    results = [bridge_evidence(TwoHills(), found, seed) for seed in range(10)]
+    assert all(r.reliable for r in results)
+    z = np.array([r.value / r.error for r in results])
+    assert np.abs(z).max() < 4.0
 
 
 def test_a_narrow_q_is_not_reliable():

@@ -14,7 +14,7 @@ from mpam_calib.criticism.odds import odds
 from mpam_calib.criticism.select import COLUMNS, Selection
 from mpam_calib.report.choices import choice_sentences
 from mpam_calib.report.page import DataTable, Notice, Page, Verdict
-from mpam_calib.report.selection import ranking_table, selection_page
+from mpam_calib.report.selection import evidence_text, ranking_table, selection_page
 
 SPECIMEN = specimen_of("develop-null-006")
 
@@ -53,6 +53,12 @@ def test_the_box_is_green_only_where_levels_left_out_agree(
     (verdict,) = (b for b in page(models(*held)).lead if isinstance(b, Verdict))
     assert verdict.level == level
     assert any(said in reason for reason in verdict.reasons)
+
+
+def test_bridges_are_spoken_of_where_there_are_any() -> None:
+    assert "is by bridge sampling" in evidence_text(0.02) and "at most 0.02 nats" in evidence_text(0.02)
+    none = evidence_text(float("nan"))
+    assert "no bridge was built" in none and "nan" not in none and "at most" not in none
 
 
 def test_effects_are_said_to_be_as_declared_and_diagnose_to_come_first() -> None:
