@@ -125,8 +125,12 @@ ALIKE = 1e-10
 """Sine of the angle between a column of the linear block and those before it, below which it adds nothing."""
 
 
+FURTHEST = 300.0
+"""Exponents beyond this are not told from it: the squares of forces and coefficients stay numbers."""
+
+
 def _exp(x: Array) -> Array:
-    return np.exp(np.clip(x, -200.0, 200.0))
+    return np.exp(np.clip(x, -FURTHEST, FURTHEST))
 
 
 def _orthogonal(columns: Array) -> Array:

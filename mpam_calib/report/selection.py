@@ -151,16 +151,21 @@ def _confusion_section(found: Selection, names: list[str]) -> Section:
     )
 
 
+def first_under(winners: list[str], first: str) -> str:
+    """Whether the ``first`` model is first under all priors; ``winners`` are those that are."""
+    each = list(dict.fromkeys(winners))
+    if each == [first]:
+        return "The first model stays first under all of them."
+    if len(each) == 1:
+        return f"Another model is first under all of them: {each[0]}."
+    return f"Which model is first depends on them: {'; '.join(each)}."
+
+
 def _sensitivity_section(found: Selection, names: list[str]) -> Section:
     """Shares among the leading models under other prior widths."""
     shares = found.sensitivity.pivot_table(index="model", columns="prior", values="probability")
     shares = shares[list(dict.fromkeys(found.sensitivity["prior"]))].reset_index(drop=True)
-    winners = sorted({names[int(i)] for i in shares.to_numpy().argmax(axis=0)})
-    said = (
-        "The first model stays first under all of them."
-        if len(winners) == 1
-        else f"Which model is first depends on them: {'; '.join(winners)}."
-    )
+    winners = shares.to_numpy().argmax(axis=0)
     formats = dict.fromkeys(shares.columns, "{:.3g}")
     shares.insert(0, "probability among these", [f"{i + 1}: {name}" for i, name in enumerate(names)])
     return Section(
@@ -169,7 +174,7 @@ def _sensitivity_section(found: Selection, names: list[str]) -> Section:
             Text(
                 "Evidence weighs a model by what its prior thought possible. Here the widths of the priors "
                 "are halved and doubled: of the moduli (stated in newtons), and of all other parameters. "
-                + said
+                + first_under([names[int(i)] for i in winners], names[0])
             ),
             DataTable(shares, "Shares among the leading models", formats),
         ],

@@ -155,7 +155,7 @@ def test_the_bridge_agrees_with_the_quadrature(problem: Problem) -> None:
 
 
 def force_map_of_a_constant_law() -> Problem:
-    """Six contractions at five levels, with the noise of the declared (poor) sensor; nothing depends on rates."""
+    """Six contractions at five levels, with the noise of a poor sensor; nothing depends on rates."""
     levels = np.array([50.0, 100.0, 150.0, 200.0, 250.0])
     P, x = (a.ravel() for a in np.meshgrid(1e3 * levels, np.linspace(0.0, 0.15, 6), indexing="ij"))
     none = np.zeros(len(P), dtype=np.int64)

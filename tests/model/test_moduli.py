@@ -10,7 +10,7 @@ from physics import plain
 
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.model import Model, build_model
-from mpam_calib.model.moduli import Columns, ModuliBlock
+from mpam_calib.model.moduli import Columns, Law, ModuliBlock, rate_parameters
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.reference import GRID_POINTS, geometric_contraction
 from mpam_calib.posterior.draws import Draws, reported
@@ -248,6 +248,17 @@ def test_rates_that_no_walker_should_have_still_give_a_force(law: str) -> None:
     assert kept.any(axis=1).all()
     wanted = np.where(kept[:, :, None] & kept[:, None, :], np.eye(transform.shape[1]), 0.0)
     np.testing.assert_allclose(gram, wanted, atol=1e-4)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.5, 1.0])
+def test_close_levels_far_from_zero_are_told_apart(gap: float) -> None:
+    """Up to a prior sd above the usual gap: 30 kPa between the levels, exponents of absolute pressure."""
+    levels = np.array([480e3, 490e3, 500e3, 510e3])
+    law = Law("exponential", 1, levels)
+    priors = {p.name: p.prior for p in rate_parameters("exponential", 1, levels)}
+    values = {name: priors[name].from_normal(np.full((1, 1), u)) for name, u in (("d", 0.0), ("gap", gap))}
+    slower = law.basis(levels, np.full(4, -1), values)[0, :, 1, 0]
+    assert slower[1:] / slower[:-1] == pytest.approx(np.full(3, np.exp(-1e4 * values["gap"][0, 0])), rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,9 @@ from mpam_calib.criticism.held_out import LEVEL_COLUMNS
 from mpam_calib.criticism.odds import odds
 from mpam_calib.criticism.select import COLUMNS, Selection
 from mpam_calib.report.choices import choice_sentences
-from mpam_calib.report.page import DataTable, Notice, Page, Verdict
+from mpam_calib.report.page import DataTable, Notice, Page, Text, Verdict
 from mpam_calib.report.selection import evidence_text, ranking_table, selection_page
+from mpam_calib.specimen.recording import Specimen
 
 SPECIMEN = specimen_of("develop-null-006")
 
@@ -28,13 +29,14 @@ def models(*held: tuple[float, float]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def page(table: pd.DataFrame) -> Page:
-    widths = [(i + 1, "as declared", 0.0, 1.0) for i in range(len(table))]
-    sensitivity = pd.DataFrame(widths, columns=["model", "prior", "log_evidence", "probability"])
+def page(table: pd.DataFrame, sensitivity: pd.DataFrame | None = None, specimen: Specimen = SPECIMEN) -> Page:
+    if sensitivity is None:
+        widths = [(i + 1, "as declared", 0.0, 1.0) for i in range(len(table))]
+        sensitivity = pd.DataFrame(widths, columns=["model", "prior", "log_evidence", "probability"])
     levels = pd.DataFrame(columns=["model", *LEVEL_COLUMNS])
     chances = odds(table, SPECIMEN.simulation)
     found = Selection(table, chances, levels, np.eye(len(table)), 0, sensitivity, 0.01)
-    return selection_page(found, SPECIMEN)
+    return selection_page(found, specimen)
 
 
 @pytest.mark.parametrize(
@@ -59,6 +61,31 @@ def test_bridges_are_spoken_of_where_there_are_any() -> None:
     assert "is by bridge sampling" in evidence_text(0.02) and "at most 0.02 nats" in evidence_text(0.02)
     none = evidence_text(float("nan"))
     assert "no bridge was built" in none and "nan" not in none and "at most" not in none
+
+
+@pytest.mark.parametrize(
+    ("second", "said"),
+    [
+        ((0.1, 0.1), "The first model stays first under all of them."),
+        ((0.9, 0.9), "Another model is first under all of them: inextensible_braid, stretch, M = 2"),
+        ((0.1, 0.9), "Which model is first depends on them: inextensible_braid, stretch, M = 1"),
+    ],
+)
+def test_which_model_is_first_under_other_priors(second: tuple[float, float], said: str) -> None:
+    """Sampled and integrated figures differ: the one that the table has first need not be."""
+    shares = [
+        (model, prior, p if model == 2 else 1.0 - p) for model in (1, 2) for prior, p in enumerate(second)
+    ]
+    sensitivity = pd.DataFrame(
+        [(model, f"prior {prior}", 0.0, share) for model, prior, share in shares],
+        columns=["model", "prior", "log_evidence", "probability"],
+    )
+    shown = page(models((-100.0, 1.0), (-110.0, 1.0)), sensitivity)
+    assert said in words_of(shown)
+
+
+def words_of(shown: Page) -> str:
+    return " ".join(b.html for s in shown.sections for b in s.blocks if isinstance(b, Text))
 
 
 def test_effects_are_said_to_be_as_declared_and_diagnose_to_come_first() -> None:
