@@ -8,6 +8,10 @@ import pandas as pd
 from markupsafe import Markup
 
 from mpam_calib.criticism.select import Selection
+from mpam_calib.model.blueprint import draw_blueprint
+from mpam_calib.model.nuisance import nuisance_parameters
+from mpam_calib.posterior.floor import pulling
+from mpam_calib.posterior.points import KINDS, gather_points
 from mpam_calib.report.choices import choices_section
 from mpam_calib.report.numbers import fixed, significant
 from mpam_calib.report.page import Block, DataTable, Headline, Notice, Page, Section, Text, Verdict
@@ -17,6 +21,8 @@ from mpam_calib.specimen.recording import Specimen
 SHOWN = 20
 SURE = 0.95
 CHOICES = ["kinematics", "strain", "order", "law", "friction", "effects"]
+MEASURED = 4e-4
+"""Nats to which the rules of integration were measured: what their own errors say below is not to be had."""
 FIGURES = ("probability", "n", "log evidence", "error (N)", "density (nats)")
 RANKING = "Best first. n: parameters; error and log density: of pressure levels that were held out."
 AS_DECLARED = Markup(
@@ -39,15 +45,20 @@ def selection_sentence(models: pd.DataFrame) -> str:
 
 
 def held_out_sentence(models: pd.DataFrame) -> tuple[bool, str]:
-    """Whether pressure levels left out prefer the first model too, and what they say.
+    """Whether pressure levels left out bear the first model out (or at least do not contradict it), and what
+    they say.
 
     Errors of two models on the same rows go together, so that the root of the sum of their squares is the
     most that their difference can be off by.
     """
     held = models.dropna(subset=["elpd_held_out"])
     first = models.iloc[0]
-    if first.name not in held.index or len(held) < 2:
+    if held.empty:
         return False, "pressure levels held out say nothing here: too few can be left out"
+    if first.name not in held.index:
+        return False, "pressure levels held out say nothing of this model: it cannot be fitted without some"
+    if len(held) < 2:
+        return False, "pressure levels held out say nothing here: no other model has a figure to compare with"
     ranked = held.sort_values("elpd_held_out", ascending=False, kind="stable")
     agrees = bool(ranked.index[0] == first.name)
     other = ranked.iloc[1 if agrees else 0]
@@ -58,7 +69,7 @@ def held_out_sentence(models: pd.DataFrame) -> tuple[bool, str]:
     if apart >= error:
         return agrees, f"held-out pressure levels prefer {winner} ({by})"
     unclear = f"that does not tell it apart from {short_name(other if agrees else first)}"
-    return agrees, f"held-out pressure levels put {winner} first, but {unclear} ({by})"
+    return True, f"held-out pressure levels put {winner} first, but {unclear} ({by})"
 
 
 def ranking_table(models: pd.DataFrame) -> tuple[pd.DataFrame, str]:
@@ -68,7 +79,7 @@ def ranking_table(models: pd.DataFrame) -> tuple[pd.DataFrame, str]:
     table = models[[c for c in CHOICES if c not in constant]].copy()
     table["probability"] = [f"{p:.3g}" for p in models["probability"]]
     table["n"] = models["n_parameters"]
-    table["log evidence"] = _with_errors(models, "log_evidence", 2)
+    table["log evidence"] = _with_errors(models, "log_evidence", 2, MEASURED)
     errors = models["rmse_held_out_N"].astype(float)
     table["error (N)"] = [significant(x) for x in errors]
     table["density (nats)"] = _with_errors(models, "elpd_held_out", 1)
@@ -92,12 +103,43 @@ def evidence_text(disagreement: float) -> str:
     )
 
 
-def _with_errors(models: pd.DataFrame, column: str, digits: int) -> list[str]:
-    """Values "v ± error", or without what is not known."""
+def _with_errors(models: pd.DataFrame, column: str, digits: int, least: float = 0.0) -> list[str]:
+    """Values "v ± error" (at ``least`` so much), or without what is not known."""
+    errors = models[f"{column}_se"].astype(float).clip(lower=least)
     found = []
-    for value, error in zip(models[column].astype(float), models[f"{column}_se"].astype(float), strict=True):
+    for value, error in zip(models[column].astype(float), errors, strict=True):
         known = f" ± {error:.1g}" if error < 1.0 else f" ± {error:.0f}"
         found.append(fixed(value, digits) + ("" if math.isnan(error) else known))
+    return found
+
+
+def declared_sds(specimen: Specimen) -> list[str]:
+    """Declared uncertainties of geometry and gauge, of which no effect takes care."""
+    setting = draw_blueprint(specimen).setting()
+    return [] if setting is None else [parameter.name for parameter in nuisance_parameters(setting)]
+
+
+def not_in_evidence(specimen: Specimen) -> list[str]:
+    """What is declared or recorded, calibration uses, and no model of the ranking does."""
+    found, slack = [], 0
+    if uncertain := declared_sds(specimen):
+        found.append(
+            f"Declared uncertainties ({', '.join(uncertain)}) are not part of this ranking: every model has "
+            "the declared values, as if they were exact. If one is off, that shows up here as another "
+            "kinematics, order or law, with a probability that is too sure."
+        )
+    if (loops := specimen.loops) is not None:
+        unclear = 0 if loops.unclear is None else int(loops.unclear.sum())
+        slack += len(loops.force_N) - int(pulling(loops).sum()) - unclear
+    if (points := gather_points(specimen)) is not None:
+        slack += int(points.censored.sum())
+        if free := int((points.kind == KINDS.index("free_contraction")).sum()):
+            found.append(f"Free contractions ({free} rows) are not part of the evidence.")
+    if slack:
+        found.append(
+            f"Slack readings ({slack}: at or below the force floor, and those that only noise lifts above "
+            "it) are not part of the evidence."
+        )
     return found
 
 
@@ -107,12 +149,14 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
     sure = float(models["probability"].iloc[0]) >= SURE
     agrees, said = held_out_sentence(models)
     reasons = [f"the best model by evidence has probability {models['probability'].iloc[0]:.3g}", said]
+    if uncertain := declared_sds(specimen):
+        reasons.append(f"declared uncertainties ({', '.join(uncertain)}) are not in the evidence")
     lead: list[Block] = [
         Headline(selection_sentence(models)),
-        Verdict("Model selection", "good" if sure and agrees else "caution", reasons),
+        Verdict("Model selection", "good" if sure and agrees and not uncertain else "caution", reasons),
         Notice(AS_DECLARED.format(", ".join(specimen.simulation.effects) or "none")),
     ]
-    lead += [Notice(text) for text in left_aside(specimen, "ranking")]
+    lead += [Notice(text) for text in [*left_aside(specimen, "ranking"), *not_in_evidence(specimen)]]
     names = [short_name(models.iloc[i]) for i in range(len(found.confusion))]
     table, same = ranking_table(models.head(SHOWN))
     sections = [

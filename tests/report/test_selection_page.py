@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,13 @@ from mpam_calib.criticism.select import COLUMNS, Selection
 from mpam_calib.report.choices import choice_sentences
 from mpam_calib.report.page import DataTable, Notice, Page, Text, Verdict
 from mpam_calib.report.selection import evidence_text, ranking_table, selection_page
-from mpam_calib.specimen.recording import Specimen
+from mpam_calib.specimen.declaration import GeometrySd, Sensors
+from mpam_calib.specimen.recording import FreeContraction, Specimen
 
 SPECIMEN = specimen_of("develop-null-006")
+
+
+UNKNOWN = (float("nan"), float("nan"))
 
 
 def models(*held: tuple[float, float]) -> pd.DataFrame:
@@ -45,11 +50,13 @@ def page(table: pd.DataFrame, sensitivity: pd.DataFrame | None = None, specimen:
         (((-100.0, 1.0), (-110.0, 1.0)), "good", "prefer the same model"),
         (((-100.0, 8.0), (-101.0, 8.0)), "good", "does not tell it apart from"),
         (((-110.0, 1.0), (-100.0, 1.0)), "caution", "prefer inextensible_braid, stretch, M = 2"),
-        (((-104.2, 8.6), (-100.0, 9.6)), "caution", "M = 2, constant, coulomb first, but that does not tell"),
-        (((float("nan"), float("nan")),) * 2, "caution", "say nothing here"),
+        (((-104.2, 8.6), (-100.0, 9.6)), "good", "M = 2, constant, coulomb first, but that does not tell"),
+        ((UNKNOWN, UNKNOWN), "caution", "too few can be left out"),
+        ((UNKNOWN, (-100.0, 1.0)), "caution", "say nothing of this model: it cannot be fitted"),
+        (((-100.0, 1.0), UNKNOWN), "caution", "no other model has a figure"),
     ],
 )
-def test_the_box_is_green_only_where_levels_left_out_agree(
+def test_the_box_is_green_only_where_levels_left_out_do_not_contradict(
     held: tuple[tuple[float, float], ...], level: str, said: str
 ) -> None:
     (verdict,) = (b for b in page(models(*held)).lead if isinstance(b, Verdict))
@@ -61,6 +68,46 @@ def test_bridges_are_spoken_of_where_there_are_any() -> None:
     assert "is by bridge sampling" in evidence_text(0.02) and "at most 0.02 nats" in evidence_text(0.02)
     none = evidence_text(float("nan"))
     assert "no bridge was built" in none and "nan" not in none and "at most" not in none
+
+
+def said_of(specimen: Specimen) -> tuple[Verdict, str]:
+    """The box, and all notices of a page on which everything else is good."""
+    lead = page(models((-100.0, 1.0), (-110.0, 1.0)), specimen=specimen).lead
+    (verdict,) = (b for b in lead if isinstance(b, Verdict))
+    return verdict, " ".join(b.html for b in lead if isinstance(b, Notice))
+
+
+def test_declared_uncertainties_are_said_to_be_left_aside() -> None:
+    assert SPECIMEN.geometry is not None
+    verdict, notices = said_of(replace(SPECIMEN, sensors=Sensors()))
+    assert verdict.level == "good" and "uncertainties" not in notices
+    sds = GeometrySd(alpha0_deg=1.0, t0_mm=0.02)
+    geometry = SPECIMEN.geometry.model_copy(update={"sd": sds})
+    gauge = Sensors(pressure_bias_sd_kPa=5.0)
+    for changed, names in (
+        ({"geometry": geometry}, "t0_mm, alpha0_deg"),
+        ({"sensors": gauge}, "pressure_bias_kPa"),
+    ):
+        verdict, notices = said_of(replace(SPECIMEN, **{"sensors": Sensors()} | changed))
+        assert verdict.level == "caution" and any(names in reason for reason in verdict.reasons)
+        assert f"Declared uncertainties ({names}) are not part of this ranking" in notices
+
+
+def test_rows_that_carry_no_evidence_are_counted() -> None:
+    assert SPECIMEN.loops is not None
+    assert "part of the evidence" not in said_of(SPECIMEN)[1]
+    free = FreeContraction(SPECIMEN.levels_Pa[:3], np.array([0.1, 0.15, 0.2]))
+    lowest = SPECIMEN.loops.force_N <= np.quantile(SPECIMEN.loops.force_N, 0.002)
+    loops = replace(SPECIMEN.loops, censored=lowest)
+    _, notices = said_of(replace(SPECIMEN, loops=loops, free_contraction=free))
+    assert "Free contractions (3 rows) are not part of the evidence" in notices
+    assert "Slack readings (" in notices
+
+
+def test_an_error_below_what_was_measured_is_not_shown() -> None:
+    table = models((-100.0, 1.0), (-110.0, 1.0))
+    table["log_evidence_se"] = [2e-7, float("nan")]
+    assert list(ranking_table(table)[0]["log evidence"]) == ["0.00 ± 0.0004", "−10.00"]
 
 
 @pytest.mark.parametrize(
