@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
 from typing import Protocol, TypeVar
 
 from mpam_calib.criticism.problem import Problem
 from mpam_calib.errors import Interrupted
-from mpam_calib.posterior.pool import settle_worker, start_method
+from mpam_calib.posterior.pool import executor_of, ignore_interrupts, results, settle_worker, start_method
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -31,7 +29,7 @@ class Spread(Protocol):
 def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
     """Worker processes that hold the problem; with one worker everything stays in this process.
 
-    Raises ``Interrupted`` where a worker is killed.
+    Raises ``Interrupted`` where a worker is killed; where anything else is raised, nobody waits for them.
     """
     # What all need is there before they begin.
     assert len(problem.axes) == len(problem.bow) == len(problem.spreads[0]) == len(problem.root)
@@ -45,10 +43,8 @@ def spread_over(problem: Problem, workers: int) -> Iterator[Spread]:
             _hold(before)
         return
     try:
-        with ProcessPoolExecutor(
-            workers, mp_context=get_context(start_method()), initializer=_begin, initargs=(problem,)
-        ) as pool:
-            yield lambda function, tasks: pool.map(function, tasks)
+        with executor_of(workers, start_method(), _begin, problem) as pool:
+            yield lambda function, tasks: results(pool, function, tasks)
     except BrokenProcessPool as error:
         raise Interrupted("interrupted: a worker process was killed (for want of memory?)") from error
 
@@ -72,6 +68,7 @@ def held_problem() -> Problem:
 
 
 def _begin(problem: Problem) -> None:
+    ignore_interrupts()
     settle_worker()
     _hold(problem)
 

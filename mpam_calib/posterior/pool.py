@@ -21,6 +21,7 @@ from mpam_calib.posterior.collapsed import Collapsed
 
 Task = TypeVar("Task")
 Found = TypeVar("Found")
+Held = TypeVar("Held")
 
 _TARGET: Collapsed | None = None
 
@@ -32,11 +33,16 @@ def held_target() -> Collapsed:
 
 
 def _adopt(target: Collapsed) -> None:
-    """Prepare a worker: it ignores Ctrl-C (its parent decides) and dies with its parent."""
+    """Prepare a worker."""
     global _TARGET
     _TARGET = target
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_interrupts()
     settle_worker()
+
+
+def ignore_interrupts() -> None:
+    """Ctrl-C is for the parent, which decides."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def start_method() -> str:
@@ -75,6 +81,18 @@ class Workers(Protocol):
         """The results in the tasks' order."""
 
 
+def results(
+    executor: ProcessPoolExecutor, work: Callable[[Task], Found], tasks: Iterable[Task]
+) -> Iterator[Found]:
+    """The results in the tasks' order; all tasks are handed out at once.
+
+    Not the executor's own map: when interrupted it cancels what waits, and a future cancelled while a worker
+    is killed ends the executor's thread with a traceback.
+    """
+    waiting = [executor.submit(work, task) for task in tasks]
+    return (each.result() for each in waiting)
+
+
 class Inline:
     """What stands for processes inside another pool's worker, which may have none of its own."""
 
@@ -92,10 +110,7 @@ class Processes:
     def map(self, work: Callable[[Task], Found], tasks: Iterable[Task]) -> list[Found]:
         """All tasks at once; raises ``Interrupted`` where a process is killed."""
         try:
-            # Not the executor's own map: when interrupted it cancels what waits, and a future cancelled
-            # while a worker is killed ends the executor's thread with a traceback.
-            waiting = [self.executor.submit(work, task) for task in tasks]
-            return [each.result() for each in waiting]
+            return list(results(self.executor, work, tasks))
         except BrokenProcessPool as error:
             raise Interrupted(
                 "interrupted: a worker process was killed (for want of memory?); what was drawn is kept, the "
@@ -115,11 +130,20 @@ def workers(target: Collapsed, wanted: int) -> Iterator[Workers]:
             _TARGET = before
         return
     count = max(1, min(wanted, os.cpu_count() or 1))
+    with executor_of(count, start_method(), _adopt, target) as executor:
+        yield Processes(executor)
+
+
+@contextmanager
+def executor_of(
+    count: int, method: str, begin: Callable[[Held], None], held: Held
+) -> Iterator[ProcessPoolExecutor]:
+    """Processes that each ``begin`` with what they hold; killed, not waited for, where anything is raised."""
     others = set(multiprocessing.active_children())
-    context = multiprocessing.get_context(start_method())
-    with ProcessPoolExecutor(count, mp_context=context, initializer=_adopt, initargs=(target,)) as executor:
+    context = multiprocessing.get_context(method)
+    with ProcessPoolExecutor(count, mp_context=context, initializer=begin, initargs=(held,)) as executor:
         try:
-            yield Processes(executor)
+            yield executor
         except BaseException:
             # Nobody waits for what they are at.
             for child in set(multiprocessing.active_children()) - others:

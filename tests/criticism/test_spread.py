@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 
 import pytest
 from rig import sets
@@ -45,6 +46,26 @@ def test_a_killed_worker_ends_the_work() -> None:
         assert list(spread(rows_held, [1, 2, 3])) == [len(problem) * k for k in (1, 2, 3)]
     with pytest.raises(Interrupted, match="killed"), spread_over(problem, 2) as spread:
         list(spread(rows_held, [0, 1, 2]))
+
+
+def test_nobody_waits_for_running_tasks_of_an_interrupted_search() -> None:
+    """What was returned before is there; the rest is killed."""
+    recipe = next(r for r in sets.recipes("develop") if r.group == "null")
+    problem = problem_of(specimen_of(recipe.name))
+    start, seen = time.monotonic(), []
+    with pytest.raises(KeyboardInterrupt), spread_over(problem, 2) as spread:
+        for slept in spread(sleep, [0.0, 60.0, 60.0, 60.0]):
+            seen.append(slept)
+            raise KeyboardInterrupt
+    assert seen == [0.0]
+    assert time.monotonic() - start < 20.0
+
+
+def sleep(seconds: float) -> float:
+    """A long task, which no Ctrl-C of a terminal ends."""
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(seconds)
+    return seconds
 
 
 def test_processes_that_begin_afresh_do_the_same_work(monkeypatch: pytest.MonkeyPatch) -> None:
