@@ -27,6 +27,10 @@ LOG_SCALES = np.linspace(-0.8, 0.8, 17)
 """Logarithms of the scales that are tried."""
 WINDOWS_SD = 0.35
 """Standard deviation of the logarithm of the noise's sd as the windows give it."""
+GUESS_SCALES, GUESS_SD = np.linspace(-3.0, 5.0, 41), 2.0
+"""The same where the noise is a guess, and the guess's standard deviation."""
+ROUNDS, SETTLED = 4, 0.05
+"""Times that models are fitted to settle a guess, and its change at which they end."""
 FLEXIBLE = ("free", "linear", "constant")
 """The law of the models that are asked: the first that a space has (of few levels it has no free one)."""
 MOST_ORDER = 5
@@ -34,7 +38,12 @@ MOST_ORDER = 5
 
 
 def settle_noise(problem: Problem, space: Sequence[Simulation]) -> Problem:
-    """The problem with its noise scaled as the most probable flexible model of a space asks."""
+    """The problem with its noise scaled as the most probable flexible model of a space asks.
+
+    Where it is a guess, as all models together ask (:func:`_settle_guess`).
+    """
+    if problem.noise_guessed:
+        return _settle_guess(problem, space)
     law = next((law for law in FLEXIBLE if any(s.law == law for s in space)), "")
     flexible = [s for s in space if s.law == law and s.order <= MOST_ORDER] or list(space)
     top = max(s.order for s in flexible)
@@ -58,18 +67,45 @@ def noise_scale(problem: Problem, fits: Sequence[Fit]) -> float:
     At their modes: ln p(y | s) = ln N(residual; 0, s² noise + remainder) + k ln s, where k is the number of
     parameters that the data settle, whose widths go with s.
     """
+    posterior = _by_scale(problem, fits, LOG_SCALES) - 0.5 * (LOG_SCALES / WINDOWS_SD) ** 2
+    return float(np.exp(_top(LOG_SCALES, posterior)))
+
+
+def _by_scale(problem: Problem, fits: Iterable[Fit], log_scales: Array) -> Array:
+    """Log evidence of one model at these scales on the noise's sd, the modes held as they are."""
     axes = problem.axes
     terms = []
     for f in fits:
         residual = axes @ (problem.force - f.force - f.doubt)
         remainder = (SIZES[f.size] * problem.force_scale) ** 2 * axes.powers
-        variance = np.exp(2.0 * LOG_SCALES)[:, None] + remainder
         settled = len(f.covariance) - float(np.trace(f.covariance))
-        change = -0.5 * np.sum(residual**2 / variance + np.log(variance), axis=1) + settled * LOG_SCALES
-        change -= change[len(LOG_SCALES) // 2]
-        terms.append(f.log_evidence + log(SIZE_PRIOR[f.size]) + change)
-    posterior = np.logaddexp.reduce(terms, axis=0) - 0.5 * (LOG_SCALES / WINDOWS_SD) ** 2
-    return float(np.exp(_top(LOG_SCALES, posterior)))
+        scales = np.append(log_scales, 0.0)
+        variance = np.exp(2.0 * scales)[:, None] + remainder
+        change = -0.5 * np.sum(residual**2 / variance + np.log(variance), axis=1) + settled * scales
+        terms.append(f.log_evidence + log(SIZE_PRIOR[f.size]) + change[:-1] - change[-1])
+    return np.asarray(np.logaddexp.reduce(terms, axis=0))
+
+
+def _settle_guess(problem: Problem, space: Sequence[Simulation]) -> Problem:
+    """Noise that no reading told before: the most probable under all models with a law without rates.
+
+    The flexible ones alone fit a few readings whatever the noise is. Where the scale is far off, parameters
+    that are settled there are others: the fits are made again.
+    """
+    plain = [s for s in space if s.law in FLEXIBLE and s.order <= MOST_ORDER] or list(space)
+    blueprints = [problem.blueprint.model_copy(update={"simulation": s}) for s in plain]
+    found, at = problem, 0.0
+    for _ in range(ROUNDS):
+        fits = [each for b in blueprints if (each := _fits(found, b, {}))]
+        if not fits:
+            return problem
+        curves = [_by_scale(found, each.values(), GUESS_SCALES - at) for each in fits]
+        posterior = np.logaddexp.reduce(curves, axis=0) - 0.5 * (GUESS_SCALES / GUESS_SD) ** 2
+        before, at = at, _top(GUESS_SCALES, posterior)
+        found = problem.with_noise_scale(float(np.exp(at)))
+        if abs(at - before) < SETTLED:
+            break
+    return found
 
 
 def _fits(problem: Problem, blueprint: Blueprint, starts: dict[int, dict[str, float]]) -> dict[int, Fit]:

@@ -85,6 +85,8 @@ class Problem:
     has_clock: bool
     saturated: float = 0.0
     rows: Rows | None = None
+    noise_guessed: bool = False
+    """Whether no sd is declared and the readings are too few to tell it (force maps)."""
 
     @cached_property
     def model(self) -> Model:
@@ -259,7 +261,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     noise: NoiseLevel | None = None
     blocks: list[Array] = []
     ties: list[Array] = []
-    loops, beyond = specimen.loops, 0.0
+    loops, beyond, guessed = specimen.loops, 0.0, False
     if loops is not None:
         every = len(loops.force_N)
         loops = loops.without(saturated(loops))
@@ -296,6 +298,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         keep, _ = telling_points(points)
         if noise is None:
             told = model.setting.force_sd or static_noise(points, points.level(model.setting.levels), scale)
+            guessed = not told
             noise = NoiseLevel(told or FORCE_MAP_NOISE * scale, 0.0, 1.0)
         rows_of = points.readings.take(keep)
         parts.append((rows_of, rows_of, points.force[keep], np.full(len(keep), -1), np.zeros(0)))
@@ -323,6 +326,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         has_clock=loops is not None,
         saturated=beyond,
         rows=None if loops is None else Rows.of(loops),
+        noise_guessed=guessed,
     )
     return replace(problem, kernel=_kernel(problem))
 

@@ -67,6 +67,8 @@ class Selection:
     replicates: int
     sensitivity: pd.DataFrame
     disagreement: float
+    noise_guess: float | None = None
+    """Noise (N) that was settled from a guess: none is declared, and the readings are too few to tell it."""
 
 
 def select(
@@ -127,6 +129,7 @@ def select(
         replicates=replicates,
         sensitivity=prior_sensitivity(widened),
         disagreement=max((w.difference for w in weighed if np.isfinite(w.difference)), default=float("nan")),
+        noise_guess=float(np.sqrt(problem.noise[0, 0])) if problem.noise_guessed else None,
     )
 
 

@@ -25,6 +25,11 @@ MEASURED = 4e-4
 """Nats to which the rules of integration were measured: what their own errors say below is not to be had."""
 FIGURES = ("probability", "n", "log evidence", "error (N)", "density (nats)")
 RANKING = "Best first. n: parameters; error and log density: of pressure levels that were held out."
+ASSUMED_NOISE = (
+    "Noise of a reading: {} N, assumed. No force_sd_N is declared and the force map has too few readings to "
+    "tell it; this is what all models together make most probable, from 0.3 % of the force scale within a "
+    "factor of about 7. All evidences are as sharp as the noise is small: declare force_sd_N if it is known."
+)
 AS_DECLARED = Markup(
     "Effects are as declared ({}) in every model of this ranking. One that is missing, such as a dead-band, "
     "shows up here as another order or strain: run <code>mpam-calib diagnose</code> first."
@@ -157,6 +162,8 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
         Notice(AS_DECLARED.format(", ".join(specimen.simulation.effects) or "none")),
     ]
     lead += [Notice(text) for text in [*left_aside(specimen, "ranking"), *not_in_evidence(specimen)]]
+    if found.noise_guess is not None:
+        lead.append(Notice(ASSUMED_NOISE.format(significant(found.noise_guess))))
     names = [short_name(models.iloc[i]) for i in range(len(found.confusion))]
     table, same = ranking_table(models.head(SHOWN))
     sections = [

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from model import build
 
 from criticism.test_evidence import loops_of_a_rig
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.fit import Fit, fit
-from mpam_calib.criticism.noise_scale import noise_scale
+from mpam_calib.criticism.noise_scale import noise_scale, settle_noise
 from mpam_calib.criticism.problem import SIZES, Problem
+from mpam_calib.criticism.space import model_space
+from mpam_calib.specimen.declaration import Sensors
+from mpam_calib.specimen.recording import ForceMap, Specimen
 
 
 def fits(problem: Problem) -> list[Fit]:
@@ -37,3 +41,44 @@ def test_smooth_misfit_is_not_taken_for_noise(drawn: Problem) -> None:
     bump = np.exp(-0.5 * ((x / x.max() - 0.5) / 0.1) ** 2)
     missed = drawn.with_force(drawn.force + 5.0 * np.sqrt(np.median(np.diagonal(drawn.noise))) * bump)
     assert noise_scale(missed, fits(missed)) == pytest.approx(1.0, abs=0.15)
+
+
+def small_map(share: float, seed: int, sensors: Sensors) -> tuple[Specimen, float]:
+    """Four contractions at five levels of a muscle with one constant modulus; and the noise that is in it, N.
+
+    ``share`` of the force scale; neither readings nor declaration tell it.
+    """
+    levels = np.array([100.0, 150.0, 200.0, 250.0, 300.0])
+    P, x = (a.ravel() for a in np.meshgrid(1e3 * levels, np.linspace(0.0, 0.2, 4), indexing="ij"))
+    none, level = np.zeros(len(P), dtype=np.int64), np.searchsorted(1e3 * levels, P)
+
+    def with_force(force: np.ndarray) -> Specimen:
+        made = ForceMap(P, x, force, level, none, none.astype(bool))
+        simulation = {"law": "constant", "order": 1, "friction": "none"}
+        return build.specimen(simulation, levels_kPa=tuple(levels), sensors=sensors, force_map=made)
+
+    problem = problem_of(with_force(np.ones(len(P))))
+    assert problem.model.chain is not None
+    force = problem.model.chain.force({"": np.zeros((1, 1))}, np.full((1, 1), -0.3), problem.middle())[0]
+    noise = share * problem.force_scale
+    return with_force(force + noise * np.random.default_rng(seed).standard_normal(len(P))), noise
+
+
+@pytest.mark.parametrize("share", [0.001, 0.04])
+def test_a_guess_is_settled_by_all_models_together(share: float) -> None:
+    """Twenty readings: moduli free at each level fit them whatever the noise is, and say nothing of it."""
+    ratio = []
+    for seed in range(5):
+        specimen, noise = small_map(share, seed, Sensors())
+        problem = problem_of(specimen)
+        assert problem.noise_guessed
+        space = [s for s in model_space(specimen) if s.order <= 3]
+        ratio.append(np.sqrt(settle_noise(problem, space).noise[0, 0]) / noise)
+    assert 0.7 < np.median(ratio) < 1.4
+    assert min(ratio) > 0.4
+    assert max(ratio) < 2.5
+
+
+def test_a_declared_noise_is_no_guess() -> None:
+    specimen, _ = small_map(0.01, 0, Sensors(force_sd_N=0.5))
+    assert not problem_of(specimen).noise_guessed

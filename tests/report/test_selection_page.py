@@ -34,13 +34,18 @@ def models(*held: tuple[float, float]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def page(table: pd.DataFrame, sensitivity: pd.DataFrame | None = None, specimen: Specimen = SPECIMEN) -> Page:
+def page(
+    table: pd.DataFrame,
+    sensitivity: pd.DataFrame | None = None,
+    specimen: Specimen = SPECIMEN,
+    noise: float | None = None,
+) -> Page:
     if sensitivity is None:
         widths = [(i + 1, "as declared", 0.0, 1.0) for i in range(len(table))]
         sensitivity = pd.DataFrame(widths, columns=["model", "prior", "log_evidence", "probability"])
     levels = pd.DataFrame(columns=["model", *LEVEL_COLUMNS])
     chances = odds(table, SPECIMEN.simulation)
-    found = Selection(table, chances, levels, np.eye(len(table)), 0, sensitivity, 0.01)
+    found = Selection(table, chances, levels, np.eye(len(table)), 0, sensitivity, 0.01, noise)
     return selection_page(found, specimen)
 
 
@@ -102,6 +107,13 @@ def test_rows_that_carry_no_evidence_are_counted() -> None:
     _, notices = said_of(replace(SPECIMEN, loops=loops, free_contraction=free))
     assert "Free contractions (3 rows) are not part of the evidence" in notices
     assert "Slack readings (" in notices
+
+
+def test_a_noise_that_was_guessed_is_stated() -> None:
+    table = models((-100.0, 1.0), (-110.0, 1.0))
+    for noise, there in ((None, False), (2.1, True)):
+        notices = " ".join(b.html for b in page(table, noise=noise).lead if isinstance(b, Notice))
+        assert ("Noise of a reading: 2.10 N, assumed" in notices) is there
 
 
 def test_an_error_below_what_was_measured_is_not_shown() -> None:
