@@ -15,6 +15,7 @@ from math import log
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from mpam_calib.criticism.fit import Fit, fit
 from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
@@ -87,9 +88,10 @@ def _by_scale(problem: Problem, fits: Iterable[Fit], log_scales: Array) -> Array
 
 
 def _settle_guess(problem: Problem, space: Sequence[Simulation]) -> Problem:
-    """Noise that no reading told before: the most probable under all models with a law without rates.
+    """Noise that no reading told before: its mean (of logarithms) under all models with a law without rates.
 
-    The flexible ones alone fit a few readings whatever the noise is. Where the scale is far off, parameters
+    The flexible ones alone fit a few readings whatever the noise is; and of three readings the most probable
+    noise is next to none. Where the scale is far off, parameters
     that are settled there are others: the fits are made again.
     """
     plain = [s for s in space if s.law in FLEXIBLE and s.order <= MOST_ORDER] or list(space)
@@ -101,7 +103,7 @@ def _settle_guess(problem: Problem, space: Sequence[Simulation]) -> Problem:
             return problem
         curves = [_by_scale(found, each.values(), GUESS_SCALES - at) for each in fits]
         posterior = np.logaddexp.reduce(curves, axis=0) - 0.5 * (GUESS_SCALES / GUESS_SD) ** 2
-        before, at = at, _top(GUESS_SCALES, posterior)
+        before, at = at, float(GUESS_SCALES @ special.softmax(posterior))
         found = problem.with_noise_scale(float(np.exp(at)))
         if abs(at - before) < SETTLED:
             break

@@ -27,8 +27,8 @@ FIGURES = ("probability", "n", "log evidence", "error (N)", "density (nats)")
 RANKING = "Best first. n: parameters; error and log density: of pressure levels that were held out."
 ASSUMED_NOISE = (
     "Noise of a reading: {} N, assumed. No force_sd_N is declared and the force map has too few readings to "
-    "tell it; this is what all models together make most probable, from 0.3 % of the force scale within a "
-    "factor of about 7. All evidences are as sharp as the noise is small: declare force_sd_N if it is known."
+    "tell it; this is what all models together make of it, from 0.3 % of the force scale within a factor of "
+    "about 7. All evidences are as sharp as the noise is small: declare force_sd_N if it is known."
 )
 AS_DECLARED = Markup(
     "Effects are as declared ({}) in every model of this ranking. One that is missing, such as a dead-band, "
