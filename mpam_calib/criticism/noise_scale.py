@@ -91,8 +91,8 @@ def _settle_guess(problem: Problem, space: Sequence[Simulation]) -> Problem:
     """Noise that no reading told before: its mean (of logarithms) under all models with a law without rates.
 
     The flexible ones alone fit a few readings whatever the noise is; and of three readings the most probable
-    noise is next to none. Where the scale is far off, parameters
-    that are settled there are others: the fits are made again.
+    noise is next to none. Where the scale is far off, parameters that are settled there are others: the fits
+    are made again.
     """
     plain = [s for s in space if s.law in FLEXIBLE and s.order <= MOST_ORDER] or list(space)
     blueprints = [problem.blueprint.model_copy(update={"simulation": s}) for s in plain]
