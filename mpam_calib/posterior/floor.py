@@ -7,6 +7,7 @@ Such a reading is no force.
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from mpam_calib.specimen.recording import Loops
@@ -61,12 +62,19 @@ def _between_flags(loops: Loops) -> NDArray[np.bool_]:
 
 
 def lifted_by_noise(
-    force: Array, place: Array, group: Ints, flagged: NDArray[np.bool_], floor: float | None
+    force: Array,
+    place: Array,
+    group: Ints,
+    flagged: NDArray[np.bool_],
+    floor: float | None,
+    sd: float | None = None,
 ) -> NDArray[np.bool_]:
     """Static readings (n,) of each group that lie, along ``place``, past the last that clearly pulls.
 
     The noise is that of the flagged readings about the floor (N). Where these are spread far more than
     neighbours differ, the muscle pushes there: no floor holds them, and a reading above it is a force.
+    Where they all read the floor itself, the noise is that of the others past them, at least the declared
+    ``sd`` (N).
     """
     nothing = np.zeros(len(force), dtype=bool)
     if not _at_the_bottom(force, flagged):
@@ -76,9 +84,30 @@ def lifted_by_noise(
     if floor is None:
         noise *= HALF
     order = np.lexsort((place, group))
-    if noise > PUSHES * noise_within(force[order], group[order]):
+    if noise == 0.0:
+        noise = _above_the_floor(force - level, place, group, flagged, sd)
+    elif noise > PUSHES * noise_within(force[order], group[order]):
         return nothing
     return _past_the_pull(force > level + SLACK_SDS * noise, place, group)
+
+
+def _above_the_floor(
+    above: Array, place: Array, group: Ints, flagged: NDArray[np.bool_], sd: float | None
+) -> float:
+    """The noise (N) of readings past their group's first flag, of which one half is cut off.
+
+    ``above`` (n,) is what they read above the floor. No noise where next to all of them are flagged: what is
+    cut off there is behind the noise, and a reading above the floor is a force.
+    """
+    past = place > -_furthest(-place, group, flagged)
+    lifted = past & ~flagged
+    if not lifted.any() or int((past & flagged).sum()) > OTHERS * int(lifted.sum()):
+        return 0.0
+    order = np.lexsort((place, group))
+    order = order[~(past | flagged)[order]]
+    # Group by group, and not much more than before the flags: past a wrong one lie pulls.
+    noise = max(SCATTER * float(pd.Series(above[lifted]).groupby(group[lifted]).median().median()), sd or 0.0)
+    return float(np.fmin(noise, PUSHES * noise_within(above[order], group[order])))
 
 
 def _at_the_bottom(force: Array, flagged: NDArray[np.bool_]) -> bool:
@@ -89,7 +118,12 @@ def _at_the_bottom(force: Array, flagged: NDArray[np.bool_]) -> bool:
 
 def _past_the_pull(pulls: NDArray[np.bool_], place: Array, group: Ints) -> NDArray[np.bool_]:
     """Readings (n,) further along ``place`` than any of their group that pulls."""
+    return np.asarray(place > _furthest(place, group, pulls))
+
+
+def _furthest(place: Array, group: Ints, among: NDArray[np.bool_]) -> Array:
+    """The largest place (n,) of some rows of each row's group; −∞ where there are none."""
     _, index = np.unique(group, return_inverse=True)
     last = np.full(int(index.max()) + 1, -np.inf)
-    np.maximum.at(last, index, np.where(pulls, place, -np.inf))
-    return np.asarray(place > last[index])
+    np.maximum.at(last, index, np.where(among, place, -np.inf))
+    return np.asarray(last[index])

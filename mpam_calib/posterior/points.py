@@ -50,7 +50,8 @@ def gather_points(specimen: Specimen) -> Points | None:
     """All points of a specimen, or None."""
     if specimen.geometry is None:
         return None
-    L0, floor = specimen.geometry.L0, specimen.sensors.force_floor_N
+    L0, sensors = specimen.geometry.L0, specimen.sensors
+    floor, sd = sensors.force_floor_N, sensors.force_sd_N
     readings: list[Readings] = []
     force: list[Array] = []
     censored: list[NDArray[np.bool_]] = []
@@ -67,12 +68,12 @@ def gather_points(specimen: Specimen) -> Points | None:
         rows = Readings.at_rest(grid.pressure_Pa, grid.contraction * L0, sign)
         rows = Readings(**{**rows.__dict__, "level": grid.level})
         curve = np.unique(np.stack([grid.level, grid.branch]), axis=1, return_inverse=True)[1].ravel()
-        lifted = lifted_by_noise(grid.force_N, grid.contraction, curve, grid.censored, floor)
+        lifted = lifted_by_noise(grid.force_N, grid.contraction, curve, grid.censored, floor, sd)
         add(rows, grid.force_N, grid.censored | lifted, 0)
     if (blocked := specimen.blocked_force) is not None:
         rows = Readings.at_rest(blocked.pressure_Pa, np.zeros_like(blocked.pressure_Pa))
         one = np.zeros(len(blocked.force_N), dtype=np.int64)
-        lifted = lifted_by_noise(blocked.force_N, -blocked.pressure_Pa, one, blocked.censored, floor)
+        lifted = lifted_by_noise(blocked.force_N, -blocked.pressure_Pa, one, blocked.censored, floor, sd)
         add(rows, blocked.force_N, blocked.censored | lifted, 1)
     if (free := specimen.free_contraction) is not None:
         rows = Readings.at_rest(free.pressure_Pa, free.contraction * L0)

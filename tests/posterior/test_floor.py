@@ -27,11 +27,14 @@ def read(seed: int, floor: float = 0.0, sd: float = NOISE) -> np.ndarray:
 
 @pytest.mark.parametrize("floor", [0.0, 0.7])
 @pytest.mark.parametrize("told", [True, False])
-def test_lifted_readings_are_found_and_no_pull_is_lost(floor: float, told: bool) -> None:
+@pytest.mark.parametrize("held", [False, True])
+def test_lifted_readings_are_found_and_no_pull_is_lost(floor: float, told: bool, held: bool) -> None:
+    """Also where the flagged ones are held at the floor, as a rig that shows no push does."""
     lifted = pulled = 0
     for seed in range(20):
         force = read(seed, floor)
         flagged = force <= floor
+        force = np.maximum(force, floor) if held else force
         found = lifted_by_noise(force, PLACE, CURVE, flagged, floor if told else None) | flagged
         deep, clear = floor > TRUE, floor + 8.0 * NOISE < TRUE
         lifted += int((deep & ~found).sum())
@@ -47,6 +50,14 @@ def test_a_sensor_that_clips_behind_its_noise_lifts_nothing() -> None:
     flagged = force <= 0.0
     found = lifted_by_noise(force, PLACE, CURVE, flagged, 0.0)
     assert not (found & ~flagged & (TRUE > 4.0 * NOISE)).any()
+
+
+def test_a_wrong_flag_among_held_ones_hides_no_pull() -> None:
+    force = np.maximum(read(6), 0.0)
+    wrong = (CURVE == 3) & (PLACE[5] == PLACE)
+    found = lifted_by_noise(np.where(wrong, 0.0, force), PLACE, CURVE, (force <= 0.0) | wrong, 0.0, NOISE)
+    assert not (found & (TRUE > 8.0 * NOISE)).any()
+    assert found[(TRUE < 0.0) & (force > 0.0)].mean() > 0.98
 
 
 def test_a_muscle_that_pushes_has_no_floor() -> None:
