@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from mpam_calib.model.pull import pulls_at
 from mpam_calib.model.reference import force_scale, geometric_contraction
 from mpam_calib.model.state import Setting
 from mpam_calib.specimen.declaration import Braid, Geometry, Noise, Sensors, Simulation
@@ -29,8 +30,6 @@ ENOUGH = 8
 """Rows that tell how a crosshead gathers its speed."""
 RAMPS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
 """Shares of a stroke's time in which it may do so."""
-PULL_SHARE = 0.02
-"""A muscle that shows this share of its greatest force pulls; a gauge that shows less of the top is at 0."""
 
 
 class Value(BaseModel):
@@ -136,7 +135,7 @@ def draw_blueprint(
         stroke=stroke,
         reach=tuple(float(r) for r in reach),
         onset=_onset(specimen),
-        pulls_at=_pulls_at(specimen),
+        pulls_at=pulls_at(specimen),
         stroke_time=None if loops is None else _stroke_time(loops),
         reading_time=0.0 if loops is None else _reading_time(loops),
         duration=0.0 if loops is None else float(loops.time_s.max()),
@@ -192,25 +191,6 @@ def _onset(specimen: Specimen) -> tuple[float, ...]:
         np.minimum.at(onset, nearest, free.contraction)
     known = np.isfinite(onset)
     return tuple(map(float, np.interp(levels, levels[known], onset[known]))) if known.any() else ()
-
-
-def _pulls_at(specimen: Specimen) -> float:
-    """The lowest pressure (Pa) with a clear pull; the top level where nothing pulls."""
-    top = float(specimen.levels_Pa[-1]) if len(specimen.levels_Pa) else 0.0
-    loops, grid, blocked = specimen.loops, specimen.force_map, specimen.blocked_force
-    parts = [p for p in (loops, grid, blocked) if p is not None]
-    if not parts:
-        return top
-    force = np.concatenate([part.force_N for part in parts])
-    pressure = np.concatenate([part.pressure_Pa for part in parts])
-    # A bladder that is longer than at rest pulls by itself: what it pulls says nothing of the pressure.
-    way = [] if loops is None else [loops.displacement_m]
-    way += [] if grid is None else [grid.contraction]
-    way += [] if blocked is None else [np.zeros(len(blocked.force_N))]
-    clear = force > max(PULL_SHARE * float(force.max()), 5.0 * (specimen.sensors.force_sd_N or 0.0))
-    clear &= (np.concatenate(way) >= 0.0) & (pressure > PULL_SHARE * top)
-    # One stray reading must not decide: the first percentile of the pulling pressures.
-    return float(np.quantile(pressure[clear], 0.01)) if clear.any() else top
 
 
 def _tensile_range(specimen: Specimen) -> tuple[float, float] | None:
