@@ -25,7 +25,7 @@ from mpam_calib.posterior.algebra import LOG_2PI, condense, inverse, log_determi
 from mpam_calib.posterior.bins import SLACK_ABOVE, LoopBins
 from mpam_calib.posterior.covariance import StrokeCovariance, fast_noise_covariance, fast_noise_log_likelihood
 from mpam_calib.posterior.piece import Piece, forget, segment_piece, total, white_piece
-from mpam_calib.posterior.points import Points, TensilePoints
+from mpam_calib.posterior.points import FREE, Points, TensilePoints
 from mpam_calib.posterior.scatter import Scatter
 from mpam_calib.posterior.sites import FreeRows, Sites, chunk_log_likelihood, usual_chunks
 from mpam_calib.posterior.slack import Slack, with_slack
@@ -336,7 +336,7 @@ class Collapsed:
         if GROWTH in values:
             force = points.force if self.guide.points is None else self.guide.points
             variance *= self._growth(values, force) ** 2
-        at_zero = points.kind == 2
+        at_zero = points.kind == FREE
         if at_zero.any():
             slope = self.guide.slope if self.guide.slope is not None else np.zeros(len(points))
             length = self.model.setting.geometry.L0 if self.model.setting else 1.0
@@ -349,7 +349,7 @@ class Collapsed:
                 Slack(
                     np.broadcast_to(terms.fixed, (B, len(points)))[:, rows],
                     design[:, rows],
-                    np.full((B, int(rows.sum())), self.data.floor),
+                    np.tile(np.where(points.kind[rows] == FREE, 0.0, self.data.floor), (B, 1)),
                     np.sqrt(variance[:, rows]),
                 )
             )

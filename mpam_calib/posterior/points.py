@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.floor import lifted_by_noise
-from mpam_calib.specimen.recording import Specimen, Tensile
+from mpam_calib.specimen.recording import FreeContraction, Specimen, Tensile
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ TENSILE_POINTS = 400
 @dataclass(frozen=True)
 class Points:
     """Points (n,): ``force`` in N; ``censored`` where only "at or below the floor" is known, also those that
-    noise lifts above it.
+    noise lifts above it. The floor of a free contraction of 0 is a force of 0.
 
     ``kind`` is 0 for a force map, 1 for a blocked force, 2 for a free contraction (a force of zero
     at a measured contraction, whose own noise enters through the curve's slope).
@@ -44,6 +44,7 @@ class Points:
 
 
 KINDS = ("force_map", "blocked_force", "free_contraction")
+FREE = KINDS.index("free_contraction")
 
 
 def gather_points(specimen: Specimen) -> Points | None:
@@ -77,7 +78,7 @@ def gather_points(specimen: Specimen) -> Points | None:
         add(rows, blocked.force_N, blocked.censored | lifted, 1)
     if (free := specimen.free_contraction) is not None:
         rows = Readings.at_rest(free.pressure_Pa, free.contraction * L0)
-        add(rows, np.zeros_like(free.contraction), np.zeros(len(free.contraction), dtype=bool), 2)
+        add(rows, np.zeros_like(free.contraction), _without_way(free), FREE)
     if not readings:
         return None
     return Points(
@@ -85,13 +86,24 @@ def gather_points(specimen: Specimen) -> Points | None:
     )
 
 
+def _without_way(free: FreeContraction) -> NDArray[np.bool_]:
+    """Free contractions (n,) of a muscle that does not contract: at 0 its force is none, or pushes.
+
+    Also those that only noise lifts above 0, at pressures below any that clearly contracts it.
+    """
+    flagged = free.contraction <= 0.0
+    one = np.zeros(len(flagged), dtype=np.int64)
+    return flagged | lifted_by_noise(free.contraction, -free.pressure_Pa, one, flagged, 0.0)
+
+
 def floor_of(declared: float | None, points: Points | None) -> float:
     """The floor (N) of slack readings: where none is declared what they read, at least nothing."""
     if declared is not None:
         return declared
-    if points is None or not points.censored.any():
+    slack = None if points is None else points.censored & (points.kind != FREE)
+    if points is None or slack is None or not slack.any():
         return 0.0
-    return max(float(np.median(points.force[points.censored])), 0.0)
+    return max(float(np.median(points.force[slack])), 0.0)
 
 
 @dataclass(frozen=True)

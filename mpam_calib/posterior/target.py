@@ -15,7 +15,7 @@ from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.posterior.bins import LoopBins, bin_loops
 from mpam_calib.posterior.collapsed import Collapsed, Data, Guide
 from mpam_calib.posterior.mode import Mode, climb_modes, find_modes
-from mpam_calib.posterior.points import floor_of, gather_points, gather_tensile
+from mpam_calib.posterior.points import FREE, floor_of, gather_points, gather_tensile
 from mpam_calib.posterior.sites import LEAST_SHARE
 from mpam_calib.specimen.recording import Loops, Specimen
 
@@ -192,7 +192,7 @@ def _matters(target: Collapsed, guide: Guide) -> bool:
         if before is None or float(np.max(np.abs(noise - before))) > SITE_TOLERANCE * typical:
             return True
     signs = any(item is not None and bool(np.any(item < 0.0)) for item in (guide.bins, guide.points))
-    slopes = data.points is not None and bool(np.any(data.points.kind == 2))
+    slopes = data.points is not None and bool(np.any(data.points.kind == FREE))
     if not (chain.uses_force or signs or slopes or GROWTH in target.model.names):
         return False
     setting = chain.setting
