@@ -26,7 +26,7 @@ from mpam_calib.report.held import (
 from mpam_calib.report.limit import Limit
 from mpam_calib.report.noise_size import noise_known, noise_size
 from mpam_calib.report.numbers import significant
-from mpam_calib.report.reach import UNSEEN, cut_off, extrapolation
+from mpam_calib.report.reach import UNSEEN, between_ends, cut_off, extrapolation
 from mpam_calib.report.view import CalibrationView
 
 REMAINDER_CAUTION: Final = 0.02
@@ -215,6 +215,7 @@ CHECKS: tuple[Check, ...] = (
         lambda view: not view.tensile and cut_off(view) is None,
     ),
     Check(cut_off),
+    Check(between_ends),
     Check(source),
     Check(gauge),
     Check(identification, "every parameter is identified", lambda view: not view.unidentified.empty),

@@ -85,3 +85,13 @@ def test_a_band_that_ends_where_the_curves_do(sound: CalibrationView) -> None:
     assert "the upper end is where the curves end" in page
     assert "ends only where the curves end." in page
     assert "where the curves end" not in calibration_page(sound).render()
+
+
+def test_forces_between_the_ends_of_the_curve_are_not_to_be_taken_where_none_was_read(
+    sound: CalibrationView,
+) -> None:
+    assert reach.between_ends(sound) is None
+    assert reach.between_ends(cut(sound, 0.5, 0.98)) is None
+    limit = reach.between_ends(cut(sound, -1.0, 0.98))
+    assert limit is not None and limit.level == "caution"
+    assert limit.sentence in " ".join(assess(cut(sound, -1.0, 0.98)).reasons)
