@@ -11,6 +11,7 @@ from mpam_calib.report.view import CalibrationView
 
 UNSEEN: Final = 0.1
 """Share of the free contraction that readings may end before, and yet come near it."""
+CARRIED: Final = "the simulation carries the number there, not the data."
 
 
 def extrapolation(view: CalibrationView) -> Limit | None:
@@ -59,9 +60,6 @@ def between_ends(view: CalibrationView) -> Limit | None:
         "would tell it."
     )
     return Limit("caution", sentence, "no force was read between the curve's ends")
-
-
-CARRIED: Final = "the simulation carries the number there, not the data."
 
 
 def _unseen(view: CalibrationView, free: pd.Series) -> str:
