@@ -22,7 +22,9 @@ class Readings:
     distance since the last reversal (m) and ``reversal`` 0 on a stroke that no reversal began;
     ``strokes_before`` (n, 2) are the lengths (m) of the stroke before and of the one before that, of
     whatever level (FAR where there was none); ``behind`` is
-    how far (m) the reading lies short of the longest contraction that the test had reached; ``speed``
+    how far (m) the reading lies short of the longest contraction that the test had reached; ``relaxed``
+    (n, len(TIMES)) is the share of the pressure to which relaxation with each of these time constants has
+    got used, every step of pressure from when it was made; ``speed``
     (m/s, 0: at rest) is the crosshead's at the reading, ``pace`` that of its whole stroke.
     """
 
@@ -39,6 +41,7 @@ class Readings:
     reversal: Array
     strokes_before: Array
     behind: Array
+    relaxed: Array
     speed: Array
     pace: Array
 
@@ -89,11 +92,14 @@ class Readings:
             reversal=zero,
             strokes_before=np.full((*p.shape, 2), FAR),
             behind=zero + FAR,
+            relaxed=np.zeros((*p.shape, len(TIMES))),
             speed=zero,
             pace=zero,
         )
 
 
+TIMES = 10.0 ** np.arange(0.0, 4.0, 0.5)
+"""Time constants (s) for which ``relaxed`` is kept."""
 SETTLED = 1e6
 """Cycle count that stands for "after many cycles"."""
 FAR = 1e3

@@ -163,6 +163,7 @@ def bin_loops(loops: Loops, most: int = BINS, finest: int = 2, memory: bool = Tr
         "strokes_before": rows.strokes_before[starts],
         "speed": np.exp(moving_mean(np.log(np.maximum(rows.speed, 1e-12)))),
     }
+    common["relaxed"] = np.add.reduceat(rows.relaxed, starts) / count[:, None]
     behind = mean(rows.behind)
     # What is stretched for the first time is so at both points.
     apart = np.where(behind < spread, 0.0, direction * spread)

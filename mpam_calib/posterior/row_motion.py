@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.model.readings import FAR, Readings
+from mpam_calib.model.readings import FAR, TIMES, Readings
 from mpam_calib.specimen.motion import run_ids, run_starts
 from mpam_calib.specimen.recording import Loops
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+LOWEST_PRESSURE = 0.05
+"""Share of the highest pressure below which relaxation is not told as a share of less."""
 AT_REST = 0.06
 """Up to this share of its stroke's largest speed the crosshead is at rest."""
 DEAD_STOP, ABRUPT = 0.2, 0.5
@@ -28,7 +30,8 @@ def rows_and_rest(loops: Loops) -> tuple[Readings, NDArray[np.bool_]]:
     """The same, and whether the crosshead stands still at it (rows,)."""
     first, lengths = loops.strokes
     segment = np.repeat(np.arange(len(first)), lengths)
-    travel, reversal, before, at_level = _history(loops, first, lengths)
+    travel, reversal, before = _history(loops, first, lengths)
+    at_level, relaxed = _at_level(loops, first, lengths)
     speed, rest = _speeds(loops, first, first + lengths - 1, segment)
     readings = Readings(
         pressure=loops.pressure_Pa,
@@ -44,6 +47,7 @@ def rows_and_rest(loops: Loops) -> tuple[Readings, NDArray[np.bool_]]:
         reversal=reversal[segment],
         strokes_before=before[segment],
         behind=np.maximum.accumulate(loops.displacement_m) - loops.displacement_m,
+        relaxed=relaxed,
         speed=speed,
         pace=_paces(speed, rest, segment)[segment],
     )
@@ -59,14 +63,11 @@ def test_cycles(loops: Loops) -> Array:
     return np.asarray(loops.cycle + (before - first + 1)[run], dtype=np.float64)
 
 
-def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array, Array]:
+def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Array]:
     """Travel since the turn (rows); of strokes whether a reversal began them, and the lengths of the two
-    before (strokes, 2); time at the level (rows)."""
+    before (strokes, 2)."""
     segment = np.repeat(np.arange(len(first)), lengths)
-    same_level = np.zeros(len(first), dtype=bool)
-    same_level[1:] = (loops.level[first][1:] == loops.level[first][:-1]) & (
-        loops.clock[first][1:] == loops.clock[first][:-1]
-    )
+    same_level = _same_level(loops, first)
     opposite = np.zeros(len(first), dtype=bool)
     opposite[1:] = loops.branch[first][1:] == -loops.branch[first][:-1]
     last = first + lengths - 1
@@ -87,13 +88,40 @@ def _history(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array, Ar
     turns = loops.displacement_m[first] - direction * since_turn
     since_turn = _since_the_start(loops, first, direction, turned, turns, since_turn, way_out)
     travel = since_turn[segment] + np.abs(loops.displacement_m - loops.displacement_m[first][segment])
-    run = np.cumsum(~same_level) - 1
-    level_start = loops.time_s[first][~same_level]
-    at_level = loops.time_s - level_start[run][segment]
     goes_on = np.concatenate([[False], loops.clock[first][1:] == loops.clock[first][:-1]]) & opposite
     ended = np.where(turned, turns, came_from)
     before = _lengths_before(np.abs(ended - np.concatenate([[0.0], turns[:-1]])), goes_on)
-    return travel, turned.astype(np.float64), before, at_level
+    return travel, turned.astype(np.float64), before
+
+
+def _same_level(loops: Loops, first: Ints) -> NDArray[np.bool_]:
+    """Whether each stroke (strokes,) is at the level of the one before it, on the same clock."""
+    same = np.zeros(len(first), dtype=bool)
+    same[1:] = (loops.level[first][1:] == loops.level[first][:-1]) & (
+        loops.clock[first][1:] == loops.clock[first][:-1]
+    )
+    return same
+
+
+def _at_level(loops: Loops, first: Ints, lengths: Ints) -> tuple[Array, Array]:
+    """Time since the level was reached (rows,), s, and how far relaxation has come (rows, TIMES).
+
+    On every clock the muscle begins without pressure; a step is made where its level's first row is.
+    """
+    new = ~_same_level(loops, first)
+    begins = first[new]
+    run = np.repeat(np.cumsum(new) - 1, lengths)
+    at_level = loops.time_s - loops.time_s[begins][run]
+    pressure = np.add.reduceat(loops.pressure_Pa, begins) / np.bincount(run)
+    lowest = max(LOWEST_PRESSURE * float(np.abs(pressure).max()), 1.0)
+    goes_on = np.diff(loops.clock[begins], prepend=-1) == 0
+    fades = np.exp(-np.diff(loops.time_s[begins], prepend=0.0)[:, None] / TIMES)
+    left = np.zeros((len(begins), len(TIMES)))
+    for i, step in enumerate(np.diff(pressure, prepend=0.0)):  # levels, not rows
+        left[i] = left[i - 1] * fades[i] + step if goes_on[i] else pressure[i]
+    share = left / np.maximum(pressure, lowest)[:, None]
+    reached = (pressure / np.maximum(pressure, lowest))[run, None]
+    return at_level, reached - share[run] * np.exp(-at_level[:, None] / TIMES)
 
 
 def _lengths_before(length: Array, goes_on: NDArray[np.bool_]) -> Array:

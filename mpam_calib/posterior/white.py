@@ -72,8 +72,10 @@ class Nodes:
         at_nodes, left = fit(force)
         at_rows = Readings.join([rows.take(start)] * 3)
         moving = ("pressure", "displacement", "time", "file_time", "time_at_level", "travel", "speed")
+        moved = {name: fit(getattr(rows, name))[0].ravel() for name in moving}
+        moved["relaxed"] = np.stack([fit(one)[0].ravel() for one in rows.relaxed.T], axis=1)
         return Nodes(
-            Readings(**{**vars(at_rows), **{name: fit(getattr(rows, name))[0].ravel() for name in moving}}),
+            Readings(**{**vars(at_rows), **moved}),
             at_nodes.ravel(),
             (count * share).ravel(),
             float(left @ left),

@@ -55,8 +55,8 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
         *("recovering", "force-recovering", "growing", "force-growing"),
     ),
     "creep": (
-        *("bent", "wall", "wall-bent", "early", "power", "solid", "stretched"),
-        *("wall-early", "wall-power", "wall-solid", "wall-stretched"),
+        *("bent", "wall", "wall-bent", "early", "power", "solid", "stretched", "steps"),
+        *("wall-early", "wall-power", "wall-solid", "wall-stretched", "wall-steps"),
     ),
     "force_drift": (
         *("bent", "settling", "settling-bent", "tared", "tared-bent"),

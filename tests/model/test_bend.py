@@ -10,7 +10,7 @@ import pytest
 from mpam_calib.model.bend import BENDS, DRIVERS, MOST, bend_factor
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.effect import Values, bent, effect, known_effects
-from mpam_calib.model.readings import FAR, Readings
+from mpam_calib.model.readings import FAR, TIMES, Readings
 from mpam_calib.model.state import Setting, State
 from mpam_calib.specimen.effect_ids import forms_of_id
 
@@ -47,6 +47,7 @@ def rows(setting: Setting, count: int = 40) -> Readings:
         strokes_before=np.full((count, 2), FAR),
         speed=1e-3 * 10.0 ** (2.0 * share - 1.0),
         behind=np.zeros(count),
+        relaxed=-np.expm1(-40.0 * share[:, None] / TIMES),
         pace=np.full(count, 2e-3),
     )
 

@@ -15,7 +15,7 @@ from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.moduli import Law as PackageLaw
 from mpam_calib.model.moduli import ModuliBlock
-from mpam_calib.model.readings import FAR, Readings
+from mpam_calib.model.readings import FAR, TIMES, Readings
 from mpam_calib.specimen.declaration import Braid, Geometry
 
 from . import build
@@ -42,6 +42,7 @@ def readings_of(rows: Rows) -> Readings:
         strokes_before=np.full((rows.count, 2), FAR),
         speed=rows.speed * 1e-3,
         behind=np.zeros(rows.count),
+        relaxed=-np.expm1(-rows.level_time[:, None] / TIMES),
         pace=rows.speed * 1e-3,
     )
 

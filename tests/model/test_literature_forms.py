@@ -11,7 +11,7 @@ from mpam_calib.model.chain import Chain
 from mpam_calib.model.curves import box_cox
 from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.model.moduli import Law, ModuliBlock
-from mpam_calib.model.readings import FAR, Readings
+from mpam_calib.model.readings import FAR, TIMES, Readings
 from mpam_calib.model.state import Setting, State
 from mpam_calib.physics.kinematics import SHAPES
 from mpam_calib.physics.statics import axial_lever, hoop_lever, strains
@@ -81,6 +81,7 @@ def rows(setting: Setting, count: int = 60) -> Readings:
         strokes_before=np.full((count, 2), FAR),
         speed=SPEED * 10.0 ** (2.0 * rng.permutation(share) - 1.0),
         behind=rng.permutation(share) * setting.stroke,
+        relaxed=-np.expm1(-time_at_level[:, None] / TIMES),
         pace=SPEED * 10.0 ** (2.0 * rng.permutation(share) - 1.0),
     )
 
@@ -103,6 +104,7 @@ def middle(setting: Setting, **away: float) -> Readings:
         "speed": SPEED,
         "pace": SPEED,
         "behind": 0.0,
+        "relaxed": -np.expm1(-0.5 * LEVEL_TIME / TIMES),
     }
     return Readings(**{name: np.array([value]) for name, value in (values | away).items()})
 

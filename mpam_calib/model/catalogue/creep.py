@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mpam_calib.model.curves import box_cox, settled
 from mpam_calib.model.effect import Effect, Parameters, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
+from mpam_calib.model.readings import TIMES
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
@@ -18,6 +19,8 @@ Apply = Callable[[State, Values, Setting], State]
 
 ONSET = 1.0
 """Seconds after which relaxation is counted."""
+NARROWEST = 0.25
+"""Decades by which any relaxation's times are spread: half of what lies between two of TIMES."""
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
@@ -83,6 +86,22 @@ def _stretched(state: State, values: Values, setting: Setting) -> Array:
     return np.asarray(np.log10(1.0 + _middle(setting) / ONSET) * part / middle)
 
 
+def _steps(state: State, values: Values, setting: Setting) -> Array:
+    """Decades along relaxations that every step of pressure sets off, carried on from level to level.
+
+    Their time constants lie about one, normally over the logarithm of time.
+    """
+    away = np.log10(TIMES / values["relaxation_s"]) ** 2 / (values["relaxation_decades"] ** 2 + NARROWEST**2)
+    weight = np.exp(-0.5 * (away - away.min(axis=-1, keepdims=True)))
+    middle = weight @ -np.expm1(-_middle(setting) / TIMES)[:, None]
+    part = weight @ state.readings.relaxed.T / middle
+    return np.asarray(np.log10(1.0 + _middle(setting) / ONSET) * part)
+
+
+def _decades(setting: Setting) -> Parameter:
+    return Parameter("relaxation_decades", LogNormal(0.6, 0.5), "spread of the times of relaxation", "", "")
+
+
 def _stretch(setting: Setting) -> Parameter:
     return Parameter("creep_stretch", LogNormal(0.6, 0.4), "power of the time in the exponential", "", "")
 
@@ -111,18 +130,20 @@ def _bladder(decades: Decades) -> Apply:
     return apply
 
 
-DECADES = {"early": _early, "power": _power, "solid": _solid, "stretched": _stretched}
+DECADES = {"early": _early, "power": _power, "solid": _solid, "stretched": _stretched, "steps": _steps}
 OWN: dict[str, Parameters] = {
     "early": lambda setting: (_before(setting),),
     "power": lambda setting: (_exponent(setting), _before(setting)),
     "solid": lambda setting: (_time(setting), _before(setting)),
     "stretched": lambda setting: (_time(setting), _stretch(setting)),
+    "steps": lambda setting: (_time(setting), _decades(setting)),
 }
 SOURCES = {
     "early": "the same logarithm, counted from before the first reading",
     "power": "power law of relaxation (Nutting 1921; Findley 1944)",
     "solid": "standard linear solid (Zener 1948): 1 − exp(−t/τ)",
     "stretched": "stretched exponential, 1 − exp(−(t/τ)^β) (Kohlrausch 1854; Williams & Watts 1970)",
+    "steps": "superposition of what every step of pressure sets off (Boltzmann 1874), Wiechert's solid",
 }
 """Equations for the relaxation, of the whole force or of the bladder alone."""
 
@@ -143,6 +164,7 @@ register(
         },
         own={f"{kind}{form}": own for kind in ("", "wall-") for form, own in OWN.items()},
         sources={f"{kind}{form}": source for kind in ("", "wall-") for form, source in SOURCES.items()},
+        apart=("steps",),
         kinds={"wall": "here the bladder's alone"},
         bends={"level_time": 4},
         looseness=1.5,
