@@ -9,6 +9,7 @@ import pytest
 from scipy import special
 
 from mpam_calib.model.effect import effect
+from mpam_calib.model.readings import TIMES
 from mpam_calib.model.state import State
 from mpam_calib.physics.kinematics import SHAPES, radius_inextensible_braid
 
@@ -228,10 +229,14 @@ def test_strands_that_stretch_grow_longer_and_store_energy() -> None:
     assert np.all(both.lost > 0.0) and np.any(both.shape.R != shaped.shape.R)
 
 
-def test_damage_by_the_way_fades_exponentially_along_it() -> None:
+@pytest.mark.parametrize("longest", [1.0, 1.7])
+def test_damage_by_the_way_fades_exponentially_along_it(longest: float) -> None:
+    """In one way for all levels, however long their strokes."""
     form = "stress_softening:path"
     setting = setting_for(form)
     readings = driven(setting)
+    levels = np.full(len(setting.levels), setting.stroke)
+    setting = replace(setting, strokes=levels, stroke=longest * setting.stroke)
     values = {"first_cycle_fraction": one(0.2), "softening_strokes": one(1.6)}
     gain = effect(form).apply(start(setting, readings), values, setting).wall_gain[0]
     way = np.cumsum(np.abs(np.diff(readings.displacement, prepend=0.0)))
@@ -279,6 +284,32 @@ def test_a_stretched_relaxation_is_kohlrausch_s(power: float) -> None:
     slope, at_one = np.polyfit(np.log(time[seen]), np.log(-np.log1p(-done[seen])), 1)
     assert slope == pytest.approx(power, rel=1e-6)
     assert np.exp(-at_one / slope) == pytest.approx(20.0, rel=1e-6)
+
+
+def test_relaxations_since_every_step_hold_a_logarithm_and_a_single_one() -> None:
+    """After steps up and down: log10(1 + t/1 s) of each step to 0.03 decades, one dashpot to a twentieth."""
+    setting = setting_for("creep:steps")
+    steps, ages = np.array([150e3, -50e3, 120e3]), np.array([400.0, 260.0, 80.0])
+    later = np.linspace(0.0, 60.0, 60)[:, None]
+    pressure = steps.sum()
+    readings = replace(
+        rows(setting),
+        pressure=np.full(60, pressure),
+        relaxed=(steps[:, None] * -np.expm1(-(ages + later)[..., None] / TIMES)).sum(axis=1) / pressure,
+    )
+
+    def decades(time: float, spread: float) -> np.ndarray:
+        before = start(setting, readings)
+        values = {"creep_per_decade": one(0.1), "relaxation_s": one(time), "relaxation_decades": one(spread)}
+        return (1.0 - effect("creep:steps").apply(before, values, setting).gain[0]) / 0.1
+
+    logarithm = np.log10(1.0 + ages + later) @ steps / pressure
+    found = [decades(time, spread) for time in (10.0, 30.0, 60.0, 100.0, 200.0) for spread in (0.8, 1.0, 1.4)]
+    left = [np.abs(f * np.mean(logarithm) / np.mean(f) - logarithm).max() for f in found]
+    assert min(left) < 0.03 * np.ptp(logarithm) + 0.01
+    single = -np.expm1(-(ages + later) / 50.0) @ steps / pressure
+    narrow = decades(50.0, 0.05)
+    assert np.abs(narrow * single.mean() / narrow.mean() - single).max() < 0.05 * single.max()
 
 
 @pytest.mark.parametrize("form", ["recovering", "force-recovering"])

@@ -9,7 +9,7 @@ import pytest
 from model import build
 
 from mpam_calib.model.blueprint import draw_blueprint
-from mpam_calib.model.readings import FAR
+from mpam_calib.model.readings import FAR, TIMES
 from mpam_calib.posterior.bins import bin_loops
 from mpam_calib.posterior.row_motion import row_readings
 from mpam_calib.specimen.recording import Loops
@@ -84,6 +84,34 @@ def test_a_stroke_knows_the_lengths_of_the_two_before_it():
     lengths = [whole, whole, whole, short, whole, whole, whole]
     assert before[:, 0].tolist() == [FAR, *lengths]
     assert before[:, 1].tolist() == [FAR, FAR, *lengths[:-1]]
+
+
+@pytest.mark.parametrize("levels", [(100.0, 150.0, 240.0), (240.0, 60.0, 150.0)])
+def test_relaxation_is_what_a_spring_and_a_dashpot_have_lost(levels):
+    """ẏ = (P(t) − y)/τ, step by step on a fine clock, from rest; a new file begins at rest anew."""
+    made = build.loops(levels, 12.0, 60, dt=0.2)
+    found = row_readings(made)
+    steps = np.array([made.pressure_Pa[made.level == j].mean() for j in range(3)])
+    begins = np.array([made.time_s[made.level == j].min() for j in range(3)])
+    step = 0.01
+    clock = begins[0] + step * (np.arange(round((made.time_s.max() - begins[0]) / step) + 1) + 0.5)
+    pressure = steps[np.searchsorted(begins, clock, side="right") - 1]
+    for k, time in enumerate(TIMES):
+        lost, settled = np.zeros(len(clock) + 1), 0.0
+        for i, p in enumerate(pressure):
+            settled = p + (settled - p) * np.exp(-step / time)
+            lost[i + 1] = settled
+        at = np.interp(made.time_s, np.append(begins[0], clock + 0.5 * step), lost)
+        np.testing.assert_allclose(found.relaxed[:, k], at / steps[made.level], atol=2e-3)
+    files = replace(made, clock=made.level)
+    own = row_readings(files)
+    np.testing.assert_allclose(own.relaxed, -np.expm1(-own.time_at_level[:, None] / TIMES), atol=1e-12)
+    bins = bin_loops(made)
+    means = [
+        found.relaxed[(made.time_s >= i) & (made.time_s <= j)].mean(axis=0)
+        for i, j in zip(bins.start, bins.stop, strict=True)
+    ]
+    np.testing.assert_allclose(bins.middle().relaxed, means)
 
 
 def test_travel_of_a_sudden_turn():

@@ -120,14 +120,17 @@ def _fresh(state: State, values: Values, setting: Setting) -> Array:
 
 def _path(state: State, values: Values, setting: Setting) -> Array:
     """By the way since the level was reached, forth and back: it softens within a stroke as well."""
-    part = np.minimum(state.readings.displacement / level_stroke(state, setting), 1.0)
+    stroke = level_stroke(state, setting)
+    part = np.minimum(state.readings.displacement / stroke, 1.0)
     strokes = 2.0 * (state.readings.cycle - 1.0) + np.where(state.readings.sign < 0.0, part, 2.0 - part)
-    return np.exp(-strokes / values["softening_strokes"])
+    return np.asarray(np.exp(-strokes * stroke / setting.stroke / values["softening_strokes"]))
 
 
 def _strokes(setting: Setting) -> tuple[Parameter, ...]:
     prior = LogNormal(2.0, 0.7)
-    return (Parameter("softening_strokes", prior, "strokes in which it softens", "Miehe 1995", ""),)
+    return (
+        Parameter("softening_strokes", prior, "longest strokes in whose way it softens", "Miehe 1995", ""),
+    )
 
 
 def _level_way(state: State, setting: Setting) -> Array:
