@@ -286,8 +286,10 @@ def test_a_stretched_relaxation_is_kohlrausch_s(power: float) -> None:
     assert np.exp(-at_one / slope) == pytest.approx(20.0, rel=1e-6)
 
 
-def test_relaxations_since_every_step_hold_a_logarithm_and_a_single_one() -> None:
-    """After steps up and down: log10(1 + t/1 s) of each step to 0.03 decades, one dashpot to a twentieth."""
+@pytest.mark.parametrize("early", [0.0, 25.0])
+def test_relaxations_since_every_step_hold_a_logarithm_and_a_single_one(early: float) -> None:
+    """After steps up and down, each so many seconds before its level's first reading: log10(1 + t/1 s) of
+    each to 0.03 decades, one dashpot to a twentieth."""
     setting = setting_for("creep:steps")
     steps, ages = np.array([150e3, -50e3, 120e3]), np.array([400.0, 260.0, 80.0])
     later = np.linspace(0.0, 60.0, 60)[:, None]
@@ -299,15 +301,16 @@ def test_relaxations_since_every_step_hold_a_logarithm_and_a_single_one() -> Non
     )
 
     def decades(time: float, spread: float) -> np.ndarray:
-        before = start(setting, readings)
-        values = {"creep_per_decade": one(0.1), "relaxation_s": one(time), "relaxation_decades": one(spread)}
-        return (1.0 - effect("creep:steps").apply(before, values, setting).gain[0]) / 0.1
+        values = {"creep_per_decade": 0.1, "relaxation_s": time, "relaxation_decades": spread}
+        values["creep_before_s"] = early
+        given = {name: one(value) for name, value in values.items()}
+        return (1.0 - effect("creep:steps").apply(start(setting, readings), given, setting).gain[0]) / 0.1
 
-    logarithm = np.log10(1.0 + ages + later) @ steps / pressure
+    logarithm = np.log10(1.0 + ages + later + early) @ steps / pressure
     found = [decades(time, spread) for time in (10.0, 30.0, 60.0, 100.0, 200.0) for spread in (0.8, 1.0, 1.4)]
     left = [np.abs(f * np.mean(logarithm) / np.mean(f) - logarithm).max() for f in found]
     assert min(left) < 0.03 * np.ptp(logarithm) + 0.01
-    single = -np.expm1(-(ages + later) / 50.0) @ steps / pressure
+    single = -np.expm1(-(ages + later + early) / 50.0) @ steps / pressure
     narrow = decades(50.0, 0.05)
     assert np.abs(narrow * single.mean() / narrow.mean() - single).max() < 0.05 * single.max()
 

@@ -133,7 +133,7 @@ def test_a_form_says_what_it_is_and_may_be_declared(form: str) -> None:
     assert item.source == base.sources[name]
     shared, all_names = ([p.name for p in i.parameters(setting)] for i in (base, item))
     own = base.own[name](setting) if name in base.own else ()
-    assert len(own) <= (len(setting.levels) if name in base.apart else 2)
+    assert len(own) <= (len(setting.levels) if name.removeprefix("wall-") in base.apart else 2)
     kept = shared[: base.leading.get(name)]
     assert all_names == [*kept, *(p.name for p in own if p.name not in kept)]
     assert all(p.meaning for p in item.parameters(setting))

@@ -89,12 +89,15 @@ def _stretched(state: State, values: Values, setting: Setting) -> Array:
 def _steps(state: State, values: Values, setting: Setting) -> Array:
     """Decades along relaxations that every step of pressure sets off, carried on from level to level.
 
-    Their time constants lie about one, normally over the logarithm of time.
+    Their time constants lie about one, normally over the logarithm of time; a step is made some time before
+    its level's first reading.
     """
     away = np.log10(TIMES / values["relaxation_s"]) ** 2 / (values["relaxation_decades"] ** 2 + NARROWEST**2)
     weight = np.exp(-0.5 * (away - away.min(axis=-1, keepdims=True)))
     middle = weight @ -np.expm1(-_middle(setting) / TIMES)[:, None]
-    part = weight @ state.readings.relaxed.T / middle
+    fades = np.exp(-values["creep_before_s"] / TIMES)
+    left = weight.sum(axis=-1, keepdims=True) - (weight * fades) @ (1.0 - state.readings.relaxed).T
+    part = left / middle
     return np.asarray(np.log10(1.0 + _middle(setting) / ONSET) * part)
 
 
@@ -136,7 +139,7 @@ OWN: dict[str, Parameters] = {
     "power": lambda setting: (_exponent(setting), _before(setting)),
     "solid": lambda setting: (_time(setting), _before(setting)),
     "stretched": lambda setting: (_time(setting), _stretch(setting)),
-    "steps": lambda setting: (_time(setting), _decades(setting)),
+    "steps": lambda setting: (_time(setting), _decades(setting), _before(setting)),
 }
 SOURCES = {
     "early": "the same logarithm, counted from before the first reading",
