@@ -123,7 +123,7 @@ def _finish(found: Search, width: int, tell: Callable[[float], None]) -> None:
             swapped = best
         found.polish_near()
         # A leader's own parts must have been looked at, or it could hide a passenger.
-        leaders = found.sets[:LEADERS]
+        leaders = found.sets[: min(LEADERS, width)]
         parts = [frozenset(p) for s in leaders for p in combinations(sorted(s), max(len(s) - 1, 0))]
         for size in range(len(SIZES)):
             found.refit_all((effects, size) for effects in [*parts, *leaders])
@@ -134,4 +134,4 @@ def _finish(found: Search, width: int, tell: Callable[[float], None]) -> None:
         (further, size) for further in found.with_one_more(first) for size in {0, found.best_size(first)}
     )
     found.doubt(DOUBTED * width)
-    found.over_forms()
+    found.over_forms(further=width >= WIDTH)

@@ -240,18 +240,22 @@ class Search:
         self.searched, self.fits = self.fits, dict(zip([*best, *rest], doubted, strict=True))
         self.doubting = True
 
-    def over_forms(self) -> None:
+    def over_forms(self, further: bool = True) -> None:
         """Give the sets that may lead the evidence of all their forms.
 
         The likeliest alone says too little for a cause that many equations describe, and forms that were
-        found one after the other need not be the likeliest.
+        found one after the other need not be the likeliest. What has ``further`` causes than the first may
+        be left as it is.
         """
-        least = self.score(self.sets[0]) - NEAR
-        near = [s for s in self.sets if self.score(s) > least and bends(self.best_fit(s))][:IN_PAIRS]
+        first = self.sets[0]
+        least = self.score(first) - NEAR
+        listed = [s for s in self.sets if further or not s > first]
+        near = [s for s in listed if self.score(s) > least and bends(self.best_fit(s))][:IN_PAIRS]
         found = self.spread(in_two_other_equations, [self.best_fit(s) for s in near])
         self.fits |= {(s, fit.size): fit for s, fit in zip(near, found, strict=True)}
         least = self.score(self.sets[0]) - CLOSE
-        self.refit_in_forms([s for s in self.sets if self.score(s) > least][:IN_ALL_FORMS])
+        listed = [s for s in self.sets if further or not s > self.sets[0]]
+        self.refit_in_forms([s for s in listed if self.score(s) > least][:IN_ALL_FORMS])
 
     def refit_in_forms(self, sets: Iterable[Set], spread: Spread | None = None) -> None:
         """Refit sets with one of their effects in another form, doubted; from the likeliest once more."""
