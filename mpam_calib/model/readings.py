@@ -23,8 +23,8 @@ class Readings:
     ``strokes_before`` (n, 2) are the lengths (m) of the stroke before and of the one before that, of
     whatever level (FAR where there was none); ``behind`` is
     how far (m) the reading lies short of the longest contraction that the test had reached; ``relaxed``
-    (n, len(TIMES)) is the share of the pressure to which relaxation with each of these time constants has
-    got used, every step of pressure from when it was made; ``speed``
+    (n, len(TIMES)) is what relaxation with each of these time constants has lost since every step of
+    pressure that was made, over the pressure; ``speed``
     (m/s, 0: at rest) is the crosshead's at the reading, ``pace`` that of its whole stroke.
     """
 
