@@ -9,22 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.errors import InputError
-from mpam_calib.model.blueprint import Blueprint, draw_blueprint
-from mpam_calib.model.effect import effect, known_effects
+from mpam_calib.model.blueprint import Blueprint, Options, draw_blueprint
 from mpam_calib.model.model import CONTRACTION_SD, Model, build_model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.readings import Readings
-from mpam_calib.model.remainder import ROUGH, SMOOTH
-from mpam_calib.model.tensile import MISFIT, NOISE
+from mpam_calib.model.tensile import NOISE
 from mpam_calib.posterior.draws import Draws, reported
 from mpam_calib.posterior.material import material_of
 from mpam_calib.posterior.row_motion import row_readings
 from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.curves import contraction_grid, first_root
+from mpam_calib.prediction.hidden import checked_sizes, demand_shown, with_hidden
 from mpam_calib.prediction.protocol import LEVELS, thesis_protocol
-from mpam_calib.specimen.arguments import demand_specimen, demand_whole, is_number
+from mpam_calib.specimen.arguments import demand_specimen, demand_whole
 from mpam_calib.specimen.recording import ForceMap, Loops, Specimen
-from mpam_calib.units import si_factor
 
 Array = NDArray[np.float64]
 
@@ -32,15 +30,12 @@ THESIS_FRICTION = {"K_f": 0.0787, "f_s": 0.15}
 """Friction of a specimen without data: mean of thesis Table 4.10; the text to Fig. 4.20."""
 THESIS_FORCE_SD = 0.25
 """N; 0.1 % of the thesis's 250 N load cell."""
-NOT_PUT_IN = (SMOOTH, ROUGH, NOISE, MISFIT, CONTRACTION_SD)
-"""Parameters of what is not simulated: the remainder, and other files' readings."""
-FRICTIONS = {"coulomb_friction", "strand_friction"}
-OF_FRICTION = {"presliding", "rate_friction"}
-"""Effects that are a friction, and those that only change one."""
-TYPICAL = 1.0
-"""Standard normal image of a hidden effect's default size: a large but ordinary draw of its prior."""
-FARTHEST = 6.0
-"""Standard normal image of the largest size that may be hidden, and less this of the smallest."""
+AS_DECLARED = Options(remainder=False, nuisances=False)
+"""What is simulated is the declared simulation: what is uncertain in it stays as declared."""
+WITH_REMAINDER = Options(nuisances=False)
+NOISES = (WHITE, CORRELATED, TIME, GROWTH, FREEDOM)
+NOT_PUT_IN = (NOISE, CONTRACTION_SD)
+"""Noise of files that are not simulated."""
 
 
 @dataclass(frozen=True)
@@ -60,13 +55,14 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
 
     With data: the mode fitted to them, at their rows. Without: the declared ``E_Pa`` and the thesis's
     protocol. ``hide`` maps effects (``id``, or ``id:form`` for another author's equation, whose own
-    parameters are typical) to a size in lab units (None: a typical one). Raises ``InputError`` for one that
-    is unknown, is part of the simulation, has no size to hide, or lacks what it needs, and for a size that
-    its prior all but rules out.
+    parameters are typical) to a size in lab units (None: a typical one). Uncertain geometry and a gauge's
+    offset stay as declared. Raises ``InputError`` for an effect that is unknown, is part of the simulation,
+    has no size to hide, lacks what it needs or changes no force at the rows, and for a size that its prior
+    all but rules out.
     """
     demand_specimen(specimen)
     demand_whole("--seed", seed, 0)
-    hide = _checked(hide)
+    hide = checked_sizes(hide)
     rng = np.random.default_rng([seed, 8])
     fitted = specimen.has_muscle_data
     if not fitted and (specimen.geometry is None or specimen.simulation.E_Pa is None):
@@ -82,29 +78,35 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
             "one of them, whose rows to simulate",
         )
     if fitted:
-        blueprint = draw_blueprint(specimen, material=material_of(specimen))
-        target, modes = locate(build_target(specimen, blueprint), rng)
-        values = {k: v.copy() for k, v in target.model.values(modes[0].u[None]).items()}
-        eta = target.linear_mean(values)
+        blueprint = draw_blueprint(specimen, AS_DECLARED, material_of(specimen))
+        values, eta = _mode(specimen, blueprint, rng)
+        # What the declared simulation misses is no noise: that is told beside a remainder.
+        beside, _ = _mode(specimen, blueprint.model_copy(update={"options": WITH_REMAINDER}), rng)
+        values |= {name: beside[name] for name in NOISES if name in beside}
     else:
         specimen = replace(specimen, levels_Pa=LEVELS)
-        blueprint = draw_blueprint(specimen)
+        blueprint = draw_blueprint(specimen, AS_DECLARED)
         model = build_model(blueprint)
         values = _without_data(model)
         eta = np.zeros((1, sum(model.linear_sizes)))
-    model, hidden = _with_hidden(blueprint, values, hide, specimen)
+    model, hidden = with_hidden(blueprint, values, hide, specimen)
     assert model.chain is not None
     eta = eta[:, : model.linear_sizes[0]]
     loops, grid = specimen.loops, specimen.force_map
     if not fitted:
         loops = _protocol(model, values, eta)
+    floor = specimen.sensors.force_floor_N
+    rows = [] if loops is None else [row_readings(loops)]
+    rows += [] if grid is None else [_map_readings(grid, specimen)]
+    demand_shown(model, values, eta, rows, hide, floor)
     if loops is not None:
-        force = model.chain.force(values, eta, row_readings(loops))[0]
+        force = model.chain.force(values, eta, rows[0])[0]
         assert model.setting is not None
-        floor = specimen.sensors.force_floor_N
         loops = _record(loops, force, values, model.setting.force_scale, floor, rng)
     if grid is not None:
-        grid = _record_map(model, grid, values, eta, specimen, rng)
+        force = model.chain.force(values, eta, rows[-1])[0]
+        assert model.setting is not None
+        grid = _record_map(grid, force, values, model.setting.force_scale, floor, rng)
     result = replace(
         specimen,
         loops=loops,
@@ -116,24 +118,20 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
     return Simulated(result, hidden, _put_in(model, values, eta))
 
 
+def _mode(
+    specimen: Specimen, blueprint: Blueprint, rng: np.random.Generator
+) -> tuple[dict[str, Array], Array]:
+    """Values (1, 1) by name and coordinates (1, k) of the moduli at the best mode of a fit to the data."""
+    target, modes = locate(build_target(specimen, blueprint), rng)
+    values = {name: value.copy() for name, value in target.model.values(modes[0].u[None]).items()}
+    return values, target.linear_mean(values)
+
+
 def _put_in(model: Model, values: dict[str, Array], eta: Array) -> dict[str, float]:
     """What was put in, lab units: the moduli with everything else that ``summary.csv`` would list."""
-    # What a hidden effect takes the place of (a declared sd's parameter) still acts as fitted.
-    shown = {k: float(v[0, 0] / si_factor(k)) for k, v in values.items() if k not in model.names}
     drawn = Draws(np.zeros((1, len(model.names))), values, eta, 1)
-    shown |= {item.name: float(item.draws[0]) for item in reported(model, drawn)}
-    return {name: value for name, value in shown.items() if name not in NOT_PUT_IN}
-
-
-def _checked(hide: object) -> Mapping[str, float | None]:
-    """What is to be hidden, where it is ids with sizes."""
-    expected = 'effect ids with sizes, such as {"dead_band": 7.5}, None for a typical one'
-    if not isinstance(hide, Mapping | None):
-        raise InputError("--hide", f"{type(hide).__name__} {str(hide)[:40]}", expected)
-    for name, size in (hide or {}).items():
-        if not isinstance(name, str) or not (size is None or is_number(size)):
-            raise InputError("--hide", f"{name}={size!r}", expected)
-    return hide or {}
+    listed = {item.name: float(item.draws[0]) for item in reported(model, drawn)}
+    return {name: value for name, value in listed.items() if name not in NOT_PUT_IN}
 
 
 def _without_data(model: Model) -> dict[str, Array]:
@@ -146,57 +144,6 @@ def _without_data(model: Model) -> dict[str, Array]:
     assert model.setting is not None
     values[WHITE] = np.full((1, 1), model.setting.force_sd or THESIS_FORCE_SD)
     return values
-
-
-def _with_hidden(
-    blueprint: Blueprint, values: dict[str, Array], hide: Mapping[str, float | None], specimen: Specimen
-) -> tuple[Model, dict[str, dict[str, float]]]:
-    """The model with the hidden effects, their sizes put among the values."""
-    place = "--hide"
-    hidden: dict[str, dict[str, float]] = {}
-    for declared, size in hide.items():
-        identifier, _, form = declared.partition(":")
-        if identifier not in known_effects():
-            raise InputError(place, f'"{identifier}"', "one of " + ", ".join(known_effects()))
-        forms = effect(identifier).forms
-        if declared != identifier and form not in forms:
-            known = "one of " + ", ".join(f"{identifier}:{f}" for f in forms) if forms else identifier
-            raise InputError(place, f'"{declared}"', known)
-        item = effect(declared)
-        if item.needs_braid and specimen.braid is None:
-            raise InputError(place, f"{identifier} without [braid]", "the strands' values in specimen.toml")
-        simulation = blueprint.simulation
-        if identifier in simulation.effect_ids or identifier in simulation.effects_within:
-            raise InputError(place, f'"{identifier}"', "an effect that the simulation does not have")
-        extended = simulation.model_copy(update={"effects": (*simulation.effects, declared)})
-        blueprint = blueprint.model_copy(update={"simulation": extended})
-        setting = blueprint.setting()
-        assert setting is not None
-        parameters = item.parameters(setting)
-        shared = {p.name for p in effect(identifier).parameters(setting)}
-        sizes = [p.name for p in parameters if p.name in shared]
-        if size is not None and len(sizes) != 1:
-            raise InputError(place, f"{declared}={size:g}", f"no value: {declared} has no single size")
-        hidden[declared] = {}
-        for parameter in parameters:
-            factor = si_factor(parameter.name)
-            smallest, typical, largest = (
-                float(parameter.prior.from_normal(np.array(z))) for z in (-FARTHEST, TYPICAL, FARTHEST)
-            )
-            value = typical if size is None or parameter.name not in sizes else size * factor
-            if not smallest <= value <= largest:
-                bounds = f"between {smallest / factor:.3g} and {largest / factor:.3g}"
-                expected = f"{bounds} {parameter.printed_unit}".strip()
-                raise InputError(place, f"{declared}={size:g}", expected)
-            if parameter.name in values:
-                raise InputError(place, f'"{identifier}"', f"an effect without the declared {parameter.name}")
-            values[parameter.name] = np.full((1, 1), value)
-            hidden[declared][parameter.name] = value / factor
-    rubs = blueprint.simulation.friction != "none" or FRICTIONS & set(blueprint.simulation.effect_ids)
-    for identifier in sorted(OF_FRICTION & {declared.partition(":")[0] for declared in hidden}):
-        if not rubs:
-            raise InputError(place, f"{identifier} without friction", "a friction that it can change")
-    return build_model(blueprint), hidden
 
 
 def _protocol(model: Model, values: dict[str, Array], eta: Array) -> Loops:
@@ -250,22 +197,22 @@ def _record(
     return replace(loops, force_N=reading, censored=censored, averaged=1)
 
 
-def _record_map(
-    model: Model,
-    grid: ForceMap,
-    values: dict[str, Array],
-    eta: Array,
-    specimen: Specimen,
-    rng: np.random.Generator,
-) -> ForceMap:
-    assert model.chain is not None and specimen.geometry is not None
+def _map_readings(grid: ForceMap, specimen: Specimen) -> Readings:
+    assert specimen.geometry is not None
     sign = np.where(np.abs(grid.branch) == 1, grid.branch, 0).astype(np.float64)
     readings = Readings.at_rest(grid.pressure_Pa, grid.contraction * specimen.geometry.L0, sign)
-    readings = replace(readings, level=grid.level)
-    force = model.chain.force(values, eta, readings)[0]
-    floor = specimen.sensors.force_floor_N
+    return replace(readings, level=grid.level)
+
+
+def _record_map(
+    grid: ForceMap,
+    force: Array,
+    values: dict[str, Array],
+    scale: float,
+    floor: float | None,
+    rng: np.random.Generator,
+) -> ForceMap:
     held = force if floor is None else np.maximum(force, floor)
-    assert model.setting is not None
-    reading = held + _noise(held, None, values, model.setting.force_scale, rng)
+    reading = held + _noise(held, None, values, scale, rng)
     censored = np.zeros(len(force), dtype=bool) if floor is None else reading <= floor
     return replace(grid, force_N=reading, censored=censored)

@@ -1,0 +1,121 @@
+"""What ``simulate`` puts in is the declared simulation, as it fits the data, and what is hidden: no more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mpam_calib.errors import InputError
+from mpam_calib.prediction.simulate import Simulated, simulate
+from mpam_calib.specimen import read
+
+from .command import Here
+from .small import GEOMETRY, SIMULATION, Moduli, Specimen, loops_text, map_text, static_force
+
+Array = NDArray[np.float64]
+NOTHING: Moduli = ((0.0, 0.0), (0.0, 0.0))
+DECLARED_71 = GEOMETRY.replace("72.0", "71.0")
+UNCERTAIN = "[geometry.sd]\nalpha0_deg = 2.0\n[sensors]\npressure_bias_sd_kPa = 20.0\n"
+
+
+def as_put_in(made: Simulated, dead_band_kPa: float) -> Array:
+    """Force (n,), N, of what ``truth.json`` says, by the contract's equations, with a braid of 72°."""
+    loops, put = made.specimen.loops, made.parameters
+    assert loops is not None
+    moduli = tuple((put[f"a_{k}"], put[f"b_{k}"]) for k in (1, 2))
+    pressure, contraction = loops.pressure_Pa / 1e3, loops.displacement_m / 0.05
+    # The moduli's law is one in the gauge's pressure.
+    bladder = static_force(pressure, contraction, moduli) - static_force(pressure, contraction, NOTHING)
+    free = bladder + static_force(pressure - dead_band_kPa, contraction, NOTHING)
+    return free + put["K_f"] * np.abs(free) * loops.branch
+
+
+@pytest.mark.parametrize(
+    ("geometry", "hide", "dead_band_kPa"),
+    [
+        (GEOMETRY, {}, 0.0),
+        (GEOMETRY, {"dead_band": 12.0}, 12.0),
+        (DECLARED_71, {"braid_angle": 1.0}, 0.0),
+        (DECLARED_71, {"braid_angle": 1.0, "dead_band": 12.0}, 12.0),
+    ],
+)
+def test_what_is_uncertain_stays_as_declared(
+    geometry: str, hide: dict[str, float | None], dead_band_kPa: float, tmp_path: Path
+) -> None:
+    """The data are of a braid at 72° whose gauge reads 15 kPa too much: the fit would move both."""
+    header, *rows = loops_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    text = "\n".join([header, *(f"{t},{float(P) + 15.0:.6g},{x},{F}" for t, P, x, F in cells)]) + "\n"
+    made = simulate(read(Specimen(geometry=geometry + UNCERTAIN).write(tmp_path / "own", loops=text)), hide)
+    assert not {"alpha0_deg", "pressure_bias_kPa"} & set(made.parameters)
+    assert made.specimen.loops is not None
+    missed = made.specimen.loops.force_N - as_put_in(made, dead_band_kPa)
+    noise = np.hypot(made.parameters["noise_sd_N"], made.parameters["noise_corr_sd_N"])
+    assert np.sqrt(np.mean(missed**2)) == pytest.approx(noise, rel=0.15)
+
+
+def test_the_mode_is_that_of_the_declared_simulation_and_the_noise_that_of_the_sensor(tmp_path: Path) -> None:
+    """One modulus for all pressures cannot follow the muscle: it comes as near as least squares do."""
+    simulation = SIMULATION.replace("order = 2", "order = 1").replace("linear", "constant")
+    specimen = read(Specimen(simulation=simulation).write(tmp_path / "own", loops=loops_text()))
+    made = simulate(specimen)
+    assert specimen.loops is not None and made.specimen.loops is not None
+    loops = specimen.loops
+    pressure, contraction = loops.pressure_Pa / 1e3, loops.displacement_m / 0.05
+    gas = static_force(pressure, contraction, NOTHING)
+    per_Pa = static_force(pressure, contraction, ((0.0, 1.0),)) - gas
+    left = []
+    for K_f in np.linspace(0.0, 0.2, 401):
+        factor = 1.0 + K_f * loops.branch
+        E = np.sum(factor**2 * per_Pa * (loops.force_N / factor - gas)) / np.sum((factor * per_Pa) ** 2)
+        left.append(np.mean((loops.force_N - factor * (gas + E * per_Pa)) ** 2))
+    least = np.sqrt(min(left))
+    assert least > 0.5  # ten times the noise: the simulation is wrong
+    missed = np.sqrt(np.mean((made.specimen.loops.force_N - loops.force_N) ** 2))
+    assert missed < 1.15 * least
+    assert np.hypot(made.parameters["noise_sd_N"], made.parameters["noise_corr_sd_N"]) < 0.15
+
+
+ONE_LEVEL = SIMULATION.replace("linear", "constant")
+
+
+@pytest.mark.parametrize("effect", ["force_drift", "creep", "stress_softening", "coulomb_friction"])
+def test_a_static_map_without_branches_shows_no_history_and_no_friction(
+    effect: str, tmp_path: Path, here: Here
+) -> None:
+    simulation = SIMULATION.replace('friction = "coulomb"', 'friction = "none"')
+    folder = Specimen(simulation=simulation).write(tmp_path / "own", force_map=map_text())
+    for others in ((), ("dead_band=7.5",)):
+        result = here("simulate", folder, "-o", tmp_path / "made", "--hide", effect, *others)
+        assert result.code == 2
+        said = f"error: --hide: found {effect}, which this recording cannot show, expected "
+        assert result.complaint.startswith(said)
+        assert not (tmp_path / "made").exists()
+    assert here("simulate", folder, "-o", tmp_path / "made", "--hide", "dead_band=7.5").code == 0
+
+
+@pytest.mark.parametrize("effect", ["rate_friction", "law_shape"])
+def test_one_level_at_one_speed_shows_neither_speeds_nor_laws(effect: str, tmp_path: Path) -> None:
+    specimen = read(Specimen(simulation=ONE_LEVEL).write(tmp_path / "own", loops=loops_text(levels=(150.0,))))
+    with pytest.raises(InputError, match=f"--hide: found {effect}, which this recording cannot show"):
+        simulate(specimen, {effect: None})
+
+
+def test_what_the_rows_show_is_measured_by_the_noise(muscle: Path) -> None:
+    """0.05 N; a dead-band of 1 Pa changes the force by some 3e-4 N, one of 0.1 Pa by a tenth of that."""
+    specimen = read(muscle)
+    assert simulate(specimen, {"dead_band": 1e-3}).hidden == {"dead_band": {"P_DB_kPa": 1e-3}}
+    with pytest.raises(InputError, match=r"found dead_band=0\.0001, which this recording cannot show"):
+        simulate(specimen, {"dead_band": 1e-4})
+
+
+def test_what_lies_below_the_floor_is_not_shown(tmp_path: Path) -> None:
+    """All that a floor above every force leaves is the floor."""
+    specimen = read(Specimen().write(tmp_path / "own", loops=loops_text(rows=60)))
+    high = replace(specimen, sensors=specimen.sensors.model_copy(update={"force_floor_N": 1e3}))
+    with pytest.raises(InputError, match="found dead_band=5, which this recording cannot show"):
+        simulate(high, {"dead_band": 5.0})
