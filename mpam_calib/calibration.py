@@ -30,6 +30,7 @@ from mpam_calib.specimen.arguments import (
     demand_whole,
 )
 from mpam_calib.specimen.recording import Specimen
+from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 from mpam_calib.units import KPA
 
 Array = NDArray[np.float64]
@@ -119,6 +120,9 @@ def calibrate(
     demand_number("--ess", ess_wanted, 1.0)
     demand_optional("options", options, Options)
     demand_optional("material", material, MaterialPosterior)
+    if not specimen.has_muscle_data and specimen.tensile is None:
+        expected = 'at least one, such as loops = "loops.csv"'
+        raise InputError(specimen.folder / SPECIMEN_FILE, "no data files", expected, None, "files")
     if material is None:
         material = material_of(specimen)
     target = build_target(specimen, draw_blueprint(specimen, options, material))

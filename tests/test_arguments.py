@@ -40,6 +40,16 @@ def test_an_option_of_calibrate_that_means_nothing(name: str, rubber: mc.Specime
     assert str(error.value).startswith(said)
 
 
+def test_a_specimen_without_data_cannot_be_calibrated(tmp_path: Path) -> None:
+    declared = '[simulation]\nmoduli = "tensile"\nE_Pa = [4.0e4]\n'
+    geometry = "[geometry]\nL0_mm = 50\nR0_mm = 3\nt0_mm = 0.7\nalpha0_deg = 72\n"
+    (tmp_path / "specimen.toml").write_text(f'[specimen]\nname = "x"\n{geometry}{declared}')
+    specimen = mc.read(tmp_path, data_required=False)
+    with pytest.raises(mc.InputError) as error:
+        mc.calibrate(specimen)
+    assert str(error.value).startswith(f"{tmp_path / 'specimen.toml'}:files: found no data files, expected ")
+
+
 @pytest.mark.parametrize("function", [mc.calibrate, mc.simulate])
 @pytest.mark.parametrize("given", ["datasets/ecoflex_tension", Path("datasets/ecoflex_tension"), None])
 def test_what_is_no_specimen(given: object, function: Callable[[object], object]) -> None:
