@@ -27,8 +27,9 @@ def check(
 
     from mpam_calib.specimen import read
 
-    # In a pipe or a log there is no terminal to fit: keep each row of a table on one line.
-    width = None if sys.stdout.isatty() else 120
+    # In a pipe or a log there is no terminal to fit: keep each row of a table on one line. (A closed
+    # output is None.)
+    width = None if sys.stdout is not None and sys.stdout.isatty() else 120
     report(read(specimen, data_required=False), Console(highlight=False, width=width))
 
 

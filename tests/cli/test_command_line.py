@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import pty
 import re
+import shlex
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
+from specimen.folders import loops
 
 from mpam_calib.cli.app import ORDER
 from mpam_calib.cli.progress import sampling_progress
@@ -129,6 +131,17 @@ def test_output_that_nobody_reads_is_no_error(tmp_path: Path) -> None:
     )
     os.close(writer)
     assert "Traceback" not in result.stderr
+
+
+@pytest.mark.parametrize("closed", [">&-", ">&- 2>&-"])
+@pytest.mark.parametrize("command", ["check", "init", "--version"])
+def test_a_closed_output_is_no_error(closed: str, command: str, tmp_path: Path) -> None:
+    run("init", str(tmp_path / "new"))
+    (tmp_path / "new" / "loops.csv").write_text(loops(rate=20.0).text())
+    there = {"check": [tmp_path / "new"], "init": [tmp_path / "other"]}.get(command, [])
+    line = shlex.join([*COMMAND, command, *map(str, there)])
+    result = subprocess.run(["sh", "-c", f"{line} {closed}"], capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
 
 
 BAR = """
