@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from importlib import resources
 from pathlib import Path
 from typing import Annotated
@@ -32,4 +33,5 @@ def init(
         raise InputError(folder, "a file", "a folder to make") from None
     except OSError as error:
         raise InputError(folder, os_reason(error), "a folder that can be written") from None
-    typer.echo(f"{target}: edit it, put loops.csv beside it, then run: mpam-calib check {folder}")
+    command = f"mpam-calib check {shlex.quote(str(folder))}"
+    typer.echo(f"{target}: edit it, put loops.csv beside it, then run: {command}")

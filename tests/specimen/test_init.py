@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 
@@ -32,6 +33,13 @@ def test_passes_check_but_for_the_missing_data(tmp_path: Path, capsys: pytest.Ca
     assert f"{folder / 'loops.csv'}: found no such file" in capsys.readouterr().err
     (folder / "loops.csv").write_text(loops(rate=20.0).text())
     assert run("check", str(folder)) == 0
+
+
+def test_the_next_command_can_be_pasted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "new dir" / "x y's"
+    assert run("init", str(folder)) == 0
+    command = capsys.readouterr().out.partition("then run: ")[2]
+    assert shlex.split(command) == ["mpam-calib", "check", str(folder)]
 
 
 def test_never_overwrites(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
