@@ -7,6 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mpam_calib.physics.kinematics import SHAPES, Rest
+from mpam_calib.physics.statics import gas_force, thickness_force
 from mpam_calib.specimen.declaration import Geometry
 from mpam_calib.specimen.plausibility import longest_contraction
 from mpam_calib.specimen.recording import Floats, Loops, Specimen
@@ -35,6 +37,8 @@ STIFFNESS_PA = 100.0, 1e11
 """Between these are the moduli of everything that a bladder is made of, and far beyond."""
 STRETCHED = 0.01
 """A bladder that is longer than at rest by more than this share pulls by itself."""
+LITTLE_FURTHER = 0.01
+"""An encoder's zero may make up for this much more contraction than the braid allows."""
 SMALL_SHARE = 0.12
 """Contractions that stay below this share of what the braid allows may be in other units."""
 
@@ -259,8 +263,7 @@ def _odd_contractions(specimen: Specimen) -> list[str]:
         parts["force_map"] = specimen.force_map.contraction
     if specimen.free_contraction is not None:
         parts["free_contraction"] = specimen.free_contraction.contraction
-    # Beyond sin(alpha) = 1/sqrt(3) a thin-walled muscle pushes instead of pulling.
-    limit = 1.0 - 1.0 / (math.sqrt(3.0) * math.sin(geometry.alpha0))
+    limit = _braid_limit(geometry, specimen.simulation.kinematics)
     longest = longest_contraction(geometry)
     remarks = []
     for name, contraction in parts.items():
@@ -269,7 +272,10 @@ def _odd_contractions(specimen: Specimen) -> list[str]:
                 f"loops: contractions up to {contraction.max():.3g}, while the braid allows {limit:.2g}; is "
                 "displacement_mm in millimetres, and L0_mm the free length?"
             )
-        beyond, straight = int((contraction > limit).sum()), int((contraction <= longest).sum())
+        beyond, straight = (
+            int((contraction > limit + LITTLE_FURTHER).sum()),
+            int((contraction <= longest).sum()),
+        )
         if beyond:
             remarks.append(
                 f"{name}: {beyond} rows contract further than the braid's limit of {limit:.3f} "
@@ -280,6 +286,20 @@ def _odd_contractions(specimen: Specimen) -> list[str]:
                 f"{name}: {straight} rows are longer than the straight strands (contraction {longest:.3f})"
             )
     return remarks
+
+
+def _braid_limit(geometry: Geometry, kinematics: str) -> float:
+    """The contraction beyond which the pressure pushes instead of pulling."""
+    # Of a thin wall that is sin(alpha) = 1/sqrt(3); a thick one, itself under pressure, goes further.
+    thin = 1.0 - 1.0 / (math.sqrt(3.0) * math.sin(geometry.alpha0))
+    if thin <= 0.0:
+        return thin
+    contraction = np.linspace(thin, 1.0, 1000, endpoint=False)
+    rest = Rest(*np.array([geometry.L0, geometry.R0, geometry.t0, geometry.alpha0]))
+    shape = SHAPES[kinematics](geometry.L0 * (1.0 - contraction), rest)
+    pressure = np.ones(1)
+    pushes = gas_force(pressure, shape) + thickness_force(pressure, shape) < 0.0
+    return float(contraction[pushes.argmax()]) if pushes.any() else thin
 
 
 def _odd_stiffness(specimen: Specimen) -> list[str]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mpam_calib.errors import InputError
@@ -152,3 +154,43 @@ def test_what_declared_moduli_overrule_is_said(tmp_path: Path, simulation: str, 
     found = " ".join(oddities(read(make(tmp_path, text, loops=loops().text()))))
     assert said in found
     assert ("is not used" in found) == bool(said)
+
+
+def turning_point(kinematics: str) -> float:
+    """The contraction where gas and wall cancel, of a muscle of 50, 3 and 0.7 mm and 72°, by bisection."""
+    low, high = 0.0, 0.6
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        length, section = 50.0 * (1.0 - middle), 50.0 * (3.0**2 - 2.3**2)
+        sine = (1.0 - middle) * np.sin(np.radians(72.0))
+        tangent = sine**2 / (1.0 - sine**2)
+        if kinematics == "constant_thickness":
+            wall = 0.7
+            radius = (section / length + wall**2) / (2.0 * wall)
+        else:
+            radius = 3.0 * np.sqrt(1.0 - sine**2) / np.cos(np.radians(72.0))
+            wall = radius - np.sqrt(radius**2 - section / length)
+        gas = radius**2 * (2.0 * tangent - 1.0)
+        pulls = gas + 2.0 * radius * wall - wall**2 - 2.0 * tangent * radius * wall > 0.0
+        low, high = (middle, high) if pulls else (low, middle)
+    return low
+
+
+@pytest.mark.parametrize("kinematics", ["inextensible_braid", "constant_thickness"])
+@pytest.mark.parametrize(("further", "asked"), [(-0.002, False), (0.005, False), (0.03, True)])
+def test_a_thick_wall_contracts_further_than_a_thin_one(
+    kinematics: str, further: float, asked: bool, tmp_path: Path
+) -> None:
+    """As its declared thickness term says: 1 - 1/(sqrt(3) sin 72°) = 0.393 is the thin wall's."""
+    limit = turning_point(kinematics)
+    assert limit > 0.4
+    text = DECLARATION.replace('loops = "loops.csv"', 'force_map = "force_map.csv"')
+    text = text.replace("linear", "constant").replace(
+        "[simulation]", f'[simulation]\nkinematics = "{kinematics}"'
+    )
+    rows = "".join(f"200,{c:.6g},{50.0 * (1.0 - c / 0.5)}\n" for c in np.linspace(0.0, limit + further, 12))
+    found = oddities(read(make(tmp_path, text, force_map="pressure_kPa,contraction,force_N\n" + rows)))
+    assert ("is alpha0_deg from the hoop direction?" in " ".join(found)) == asked
+    if asked:
+        said = re.search(r"braid's limit of (\S+)", " ".join(found))
+        assert said is not None and float(said[1]) == pytest.approx(limit, abs=1.5e-3)
