@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from mpam_calib.errors import InputError
-from mpam_calib.specimen.arguments import demand_finite
+from mpam_calib.specimen.arguments import demand_finite, demand_name
 from mpam_calib.units import unit_of
 
 Array = NDArray[np.float64]
@@ -369,6 +369,7 @@ class Parameter:
     """Printed unit where the name does not carry it."""
 
     def __post_init__(self) -> None:
+        demand_name("Parameter", "name", self.name)
         if not callable(getattr(self.prior, "from_normal", None)):
             found = f"{type(self.prior).__name__} {self.prior!r}"
             raise InputError("Parameter", found, "a prior, such as Normal(0.0, 1.0)", None, self.name)

@@ -65,6 +65,12 @@ def demand_finite(place: str, name: str, given: object, above: float = -float("i
         raise InputError(place, _shown(given), limit, None, name)
 
 
+def demand_name(place: str, name: str, given: object) -> None:
+    """Raise ``InputError`` unless the value ``name`` of something is a word, as a table's rows have."""
+    if not isinstance(given, str) or given.split() != [given]:
+        raise InputError(place, _shown(given), "a word that ends in a unit, such as drift_N", None, name)
+
+
 def is_number(given: object) -> TypeGuard[float]:
     """Whether something is a number, of Python or of numpy."""
     return isinstance(given, Real) and not isinstance(given, bool)

@@ -167,6 +167,9 @@ WRONG = {
     "LogUniform: found low = 2.0 and high = 1.0": lambda: LogUniform(2.0, 1.0),
     "Uniform: found low = 2.0 and high = 1.0": lambda: Uniform(2.0, 1.0),
     "NormalWithin: found low = 1.0 and high = 1.0": lambda: NormalWithin(0.0, 1.0, 1.0, 1.0),
+    "Parameter:name: found str ''": lambda: Parameter("", Normal(0.0, 1.0), "a size"),
+    "Parameter:name: found 3": lambda: Parameter(3, Normal(0.0, 1.0), "a size"),
+    "Parameter:name: found str 'a size'": lambda: Parameter("a size", Normal(0.0, 1.0), "a size"),
     "Parameter:size_N: found int 5": lambda: Parameter("size_N", 5, "a size"),
 }
 
