@@ -27,8 +27,8 @@ TYPICAL = 1.0
 """Standard normal image of a hidden effect's default size: a large but ordinary draw of its prior."""
 FARTHEST = 6.0
 """Standard normal image of the largest size that may be hidden, and less this of the smallest."""
-SEEN = 1e-3
-"""Share of the noise: a hidden effect that changes no force by so much is none."""
+SEEN = 0.3
+"""Root of the sum of squares of all changes, in sds of the noise, below which nobody can tell an effect."""
 
 
 def checked_sizes(hide: object) -> Mapping[str, float | None]:
@@ -100,7 +100,7 @@ def demand_shown(
     hide: Mapping[str, float | None],
     floor: float | None,
 ) -> None:
-    """Raise ``InputError`` for a hidden effect without which every force at the rows would be the same.
+    """Raise ``InputError`` for a hidden effect without which the forces at the rows would be the same.
 
     Each by itself, beside the others; a force below the ``floor`` (N) is not read.
     """
@@ -116,7 +116,7 @@ def demand_shown(
         others = tuple(each for each in simulation.effects if each != declared)
         rest = simulation.model_copy(update={"effects": others})
         without = build_model(model.blueprint.model_copy(update={"simulation": rest}))
-        if float(np.max(np.abs(recorded(model) - recorded(without)))) < SEEN * noise:
+        if float(np.linalg.norm(recorded(model) - recorded(without))) < SEEN * noise:
             shown = declared if size is None else f"{declared}={size:g}"
             found = f"{shown}, which this recording cannot show"
-            raise InputError(PLACE, found, "an effect that changes a force at its rows")
+            raise InputError(PLACE, found, "an effect that changes the forces at its rows")

@@ -57,8 +57,8 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
     protocol. ``hide`` maps effects (``id``, or ``id:form`` for another author's equation, whose own
     parameters are typical) to a size in lab units (None: a typical one). Uncertain geometry and a gauge's
     offset stay as declared. Raises ``InputError`` for an effect that is unknown, is part of the simulation,
-    has no size to hide, lacks what it needs or changes no force at the rows, and for a size that its prior
-    all but rules out.
+    has no size to hide, lacks what it needs or changes no force that anybody could tell, and for a size that
+    its prior all but rules out.
     """
     demand_specimen(specimen)
     demand_whole("--seed", seed, 0)

@@ -105,12 +105,35 @@ def test_one_level_at_one_speed_shows_neither_speeds_nor_laws(effect: str, tmp_p
         simulate(specimen, {effect: None})
 
 
+def test_speeds_that_a_clock_of_centiseconds_tells_apart_are_one_speed(tmp_path: Path) -> None:
+    """Strokes at 0.8 mm/s throughout: what is read of their speeds differs by the clock's rounding alone."""
+    header, *rows = loops_text(rows=100).splitlines()
+    cells = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    way = np.cumsum(np.abs(np.diff(cells[:, 2], prepend=cells[0, 2])))
+    turns = np.diff(cells[:, 2], prepend=-1.0) == 0.0
+    cells[:, 0] = np.round(way / 0.8 + 0.05 * np.cumsum(turns), 2)
+    text = "\n".join([header, *(",".join(f"{cell:.8g}" for cell in row) for row in cells)]) + "\n"
+    specimen = read(Specimen().write(tmp_path / "own", loops=text))
+    with pytest.raises(InputError, match=r"found rate_friction=0\.1, which this recording cannot show"):
+        simulate(specimen, {"rate_friction": 0.1})
+
+
 def test_what_the_rows_show_is_measured_by_the_noise(muscle: Path) -> None:
-    """0.05 N; a dead-band of 1 Pa changes the force by some 3e-4 N, one of 0.1 Pa by a tenth of that."""
+    """A likelihood that knows all but the effect gains half of Σ(change/noise)²: at 0.3² it says nothing."""
     specimen = read(muscle)
-    assert simulate(specimen, {"dead_band": 1e-3}).hidden == {"dead_band": {"P_DB_kPa": 1e-3}}
-    with pytest.raises(InputError, match=r"found dead_band=0\.0001, which this recording cannot show"):
-        simulate(specimen, {"dead_band": 1e-4})
+    assert specimen.loops is not None
+    pressure, contraction = specimen.loops.pressure_Pa / 1e3, specimen.loops.displacement_m / 0.05
+    per_kPa = static_force(pressure, contraction, NOTHING) - static_force(
+        pressure - 1.0, contraction, NOTHING
+    )
+    put = simulate(specimen).parameters
+    noise = np.hypot(put["noise_sd_N"], put["noise_corr_sd_N"])
+    size = 0.3 * noise / np.linalg.norm(per_kPa * (1.0 + put["K_f"] * specimen.loops.branch))
+    for seen in (1.05 * size, -1.05 * size):
+        assert simulate(specimen, {"dead_band": seen}).hidden["dead_band"]["P_DB_kPa"] == pytest.approx(seen)
+    for unseen in (0.95 * size, -0.95 * size, 0.0):
+        with pytest.raises(InputError, match=r"found dead_band=.*, which this recording cannot show"):
+            simulate(specimen, {"dead_band": unseen})
 
 
 def test_what_lies_below_the_floor_is_not_shown(tmp_path: Path) -> None:
