@@ -12,6 +12,7 @@ import pandas as pd
 from mpam_calib.specimen.clock import Clock
 from mpam_calib.specimen.cycles import cycles_at_turns, number_cycles, returns
 from mpam_calib.specimen.declaration import Geometry
+from mpam_calib.specimen.held_length import check_held_length
 from mpam_calib.specimen.levels import setpoint_levels, setpoint_notes, sorted_levels, stroke_levels
 from mpam_calib.specimen.motion import (
     Motion,
@@ -174,13 +175,16 @@ def censored_rows(frame: pd.DataFrame, floor_N: float | None) -> Bools:
 def _check_plausible(file: DataFile, frame: pd.DataFrame, geometry: Geometry) -> None:
     held = "branch" in frame and bool(frame["branch"].isin([PRESSURISING, DEPRESSURISING]).any())
     rows = frame.index.to_numpy()
+    displacement = frame["displacement_mm"].to_numpy()
     check_codes(file.label, frame)
-    check_displacement(file.label, frame["displacement_mm"].to_numpy() * MM, rows, geometry, held=held)
-    check_force(file.label, "loops", frame["force_N"].to_numpy(), frame["displacement_mm"].to_numpy())
+    check_displacement(file.label, displacement * MM, rows, geometry, held=held)
+    if "branch" not in frame:
+        check_held_length(file.label, displacement, frame["pressure_kPa"].to_numpy(), rows)
+    check_force(file.label, "loops", frame["force_N"].to_numpy(), displacement)
     check_changes(file.label, frame["force_N"].to_numpy())
     if "branch" in frame:
         branch = frame["branch"].to_numpy().astype(np.int64)
-        check_branch(file.label, branch, frame["displacement_mm"].to_numpy() * MM, rows)
+        check_branch(file.label, branch, displacement * MM, rows)
 
 
 def _levels_and_motion(frames: Sequence[pd.DataFrame], clock: Ints, setpoints: bool) -> tuple[Ints, Motion]:
