@@ -19,7 +19,7 @@ def init(
     """Write a commented specimen.toml into DIR; the data files that it names go beside it."""
     from mpam_calib.errors import InputError
     from mpam_calib.specimen.toml_source import SPECIMEN_FILE
-    from mpam_calib.specimen.wording import os_reason
+    from mpam_calib.specimen.wording import one_line
 
     target = folder / SPECIMEN_FILE
     if target.exists():
@@ -32,6 +32,10 @@ def init(
     except FileExistsError:
         raise InputError(folder, "a file", "a folder to make") from None
     except OSError as error:
-        raise InputError(folder, os_reason(error), "a folder that can be written") from None
+        there = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+        if not there.is_dir():
+            raise InputError(there, "a file", "a folder to make the specimen in") from None
+        found = f"a folder that may not be written ({one_line(error.strerror or error)})"
+        raise InputError(there, found, "one that may") from None
     command = f"mpam-calib check {shlex.quote(str(folder))}"
     typer.echo(f"{target}: edit it, put loops.csv beside it, then run: {command}")

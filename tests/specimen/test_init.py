@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import errno
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -73,3 +75,29 @@ def test_every_optional_key_of_the_template_is_a_real_one(tmp_path: Path) -> Non
     assert specimen.geometry.sd.alpha0_deg == 1.0
     assert specimen.noise.growth and specimen.noise.robust
     assert specimen.fit.tensile_strain == (0.1, 3.0)
+
+
+@pytest.mark.parametrize("kind", [PermissionError, OSError])
+def test_a_folder_that_may_not_be_written(
+    kind: type[OSError],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its own right, or a disk that is mounted to read only."""
+    number = errno.EACCES if kind is PermissionError else errno.EROFS
+
+    def refuse(self: Path, *arguments: object, **options: object) -> None:
+        raise kind(number, os.strerror(number), str(self))
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    assert run("init", str(tmp_path / "new")) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"error: {tmp_path}: found a folder that may not be written (")
+    assert said.endswith(", expected one that may\n") and "read)" not in said
+
+
+def test_a_file_in_the_way(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("mine")
+    assert run("init", str(tmp_path / "file" / "new")) == 2
+    assert f"error: {tmp_path / 'file'}: found a file, expected a folder" in capsys.readouterr().err
