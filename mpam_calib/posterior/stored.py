@@ -17,6 +17,8 @@ from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.posterior.checkpoint import write_atomically
 from mpam_calib.posterior.draws import Draws, Reported
+from mpam_calib.specimen.effect_ids import forms_of_id, known_effect_ids
+from mpam_calib.specimen.wording import listed, quoted
 
 Array = NDArray[np.float64]
 
@@ -43,7 +45,8 @@ class StoredRun:
 def write_draws(path: Path, draws: Draws, reported: Sequence[Reported], log_prob: Array, digest: str) -> None:
     """ArviZ InferenceData, chain = ensemble: reported quantities in lab units, and what predictions need.
 
-    ``log_prob`` (ensembles, steps, walkers) is that of all steps, of which ``draws.index`` were kept.
+    ``log_prob`` (ensembles, steps, walkers) is that of all steps, of which ``draws.index`` were kept;
+    ``digest`` is the run's: the draws are of no use beside another one's ``run.json``.
     """
     az = import_arviz()
     assert draws.index is not None
@@ -81,23 +84,42 @@ def readable(path: Path) -> bool:
 
 
 def load_run(path: Path) -> StoredRun:
-    """Read a RUN folder; raises ``InputError`` where it is none or is not finished."""
+    """Read a RUN folder; raises ``InputError`` where it is none, not finished, or of several runs."""
     az = import_arviz()
     try:
         state: dict[str, Any] = json.loads((path / RUN_FILE).read_text(encoding="utf-8"))
         blueprint = Blueprint.model_validate(state["blueprint"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(path / RUN_FILE, "no finished run", "a folder that calibrate wrote") from error
+    _demand_effects(path, blueprint)
     try:
         data = az.from_netcdf(str(path / POSTERIOR), engine="h5netcdf")
         stored = data["sampler_coordinates"]
         u, eta = stored["coordinates"].to_numpy(), stored["linear_coordinates"].to_numpy()
+        digest = stored.attrs["digest"]
     except (OSError, RuntimeError, ValueError, KeyError) as error:
         found = "a damaged file" if (path / POSTERIOR).is_file() else "no such file"
         raise InputError(path / POSTERIOR, found, "the draws that calibrate wrote") from error
+    # Older versions kept the digest of the data and the declaration alone.
+    if digest not in (state.get("digest"), state.get("specimen_digest")):
+        raise InputError(path / POSTERIOR, "the draws of another run", f"those of the {RUN_FILE} beside it")
     model = build_model(blueprint)
+    widths, wanted = (u.shape[-1], eta.shape[-1]), (len(model.names), sum(model.linear_sizes))
+    if widths != wanted:
+        found = "a model of {} and {} coordinates beside draws of {} and {}".format(*wanted, *widths)
+        raise InputError(path / RUN_FILE, found, "the file that calibrate wrote")
     u, eta, chains = u.reshape(-1, u.shape[-1]), eta.reshape(-1, eta.shape[-1]), u.shape[0]
     return StoredRun(path, model, Draws(u, model.values(u), eta, chains), state)
+
+
+def _demand_effects(path: Path, blueprint: Blueprint) -> None:
+    """Raise ``InputError`` where an effect of a run, or its form, is of a package that is not there."""
+    known = known_effect_ids()
+    for written in blueprint.simulation.effects:
+        effect, _, form = written.partition(":")
+        if effect not in known or (form and form not in forms_of_id(effect)):
+            found = f"the effect {quoted(written)}, which is not installed"
+            raise InputError(path / RUN_FILE, found, f"ids among {listed(known, limit=len(known))}")
 
 
 def unconverged(path: Path) -> bool:

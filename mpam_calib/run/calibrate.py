@@ -11,7 +11,7 @@ from mpam_calib.posterior.convergence import ESS_WANTED
 from mpam_calib.posterior.material import demand_other, material_of
 from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Progress
 from mpam_calib.posterior.stored import RUN_FILE
-from mpam_calib.run.files import KEPT_FILE, demand_folder
+from mpam_calib.run.files import KEPT_FILE, demand_own, demand_writable
 from mpam_calib.run.folder import REPORT, RunFolder, run_digest
 from mpam_calib.run.replaced import tell_replaced
 from mpam_calib.specimen import read
@@ -65,13 +65,14 @@ def calibrate_to_folder(
         material=None if material is None else material.model_dump(),
     )
     folder = RunFolder(run, digest)
-    demand_folder(run, RUN_FILE, KEPT_FILE)
+    demand_own(run, RUN_FILE, KEPT_FILE)
     state = folder.state()
     if state is not None and folder.complete():
         used = int(state["sampling"]["steps"])
         cut = bool(state["sampling"].get("cut", False))
         if max_steps <= used or (state["converged"] and not cut):
             return Outcome(bool(state["converged"]), kept=True)
+    demand_writable(run)
     tell = listener or (lambda progress: None)
     tell(Progress("fitting", 0, float("nan"), 0.0, 0.0))
     with folder.checkpoint.resumable():

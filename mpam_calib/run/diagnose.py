@@ -14,7 +14,7 @@ from mpam_calib.posterior.checkpoint import write_atomically
 from mpam_calib.posterior.material import demand_other, keep_material, material_of
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.report.diagnosis import diagnosis_page
-from mpam_calib.run.files import KEPT_FILE, UNFINISHED, demand_folder, demand_forces, write_json
+from mpam_calib.run.files import KEPT_FILE, UNFINISHED, demand_forces, demand_own, demand_writable, write_json
 from mpam_calib.run.folder import run_digest
 from mpam_calib.run.kept import Kept
 from mpam_calib.run.replaced import tell_replaced
@@ -34,7 +34,7 @@ def diagnose_to_folder(
     What an interruption has left is gone on with. Raises ``InputError`` before anything is written.
     """
     specimen = read(source)
-    demand_folder(run, RUN_FILE, KEPT_FILE)
+    demand_own(run, RUN_FILE, KEPT_FILE)
     demand_other(specimen, run)
     material = material_of(specimen)
     digest = run_digest(specimen.digest, command="diagnose", seed=seed, material=material)
@@ -42,6 +42,7 @@ def diagnose_to_folder(
     kept = Kept(run, "diagnose", digest, files)
     if kept.finished():
         return None
+    demand_writable(run)
     _demand_extended(source, run)
     demand_forces(specimen, "one to diagnose")
     tell_replaced(run, "diagnosis")

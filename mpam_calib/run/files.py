@@ -36,6 +36,15 @@ OURS = (
 def demand_folder(path: Path, *replaces: str) -> None:
     """Raise ``InputError`` where results cannot be written to a folder, or would mix with what others left.
 
+    ``replaces`` as in :func:`demand_own`.
+    """
+    demand_own(path, *replaces)
+    demand_writable(path)
+
+
+def demand_own(path: Path, *replaces: str) -> None:
+    """Raise ``InputError`` where results would mix with what others left, written or not.
+
     ``replaces`` names those of ``OWNERS`` whose folders may be written again.
     """
     if path.exists() and not path.is_dir():
@@ -46,6 +55,10 @@ def demand_folder(path: Path, *replaces: str) -> None:
     others = [name for name in GENERIC if (path / name).exists()]
     if others and not any((path / name).exists() for name in OURS):
         raise InputError(path / others[0], "a file that no run wrote", "a new folder for these results")
+
+
+def demand_writable(path: Path) -> None:
+    """Raise ``InputError`` where a folder cannot be written, or made."""
     there = next(folder for folder in (path.absolute(), *path.absolute().parents) if folder.exists())
     if not there.is_dir():
         raise InputError(there, "a file", "a folder to make the run in")

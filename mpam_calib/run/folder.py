@@ -93,7 +93,7 @@ class RunFolder:
             calibration.draws,
             calibration.reported,
             calibration.sampling.log_prob,
-            calibration.specimen.digest,
+            self.digest,
         )
         write_json(describe(calibration, self.digest), self.path / RUN_FILE)
 

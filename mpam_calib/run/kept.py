@@ -61,9 +61,9 @@ class Kept:
 
     def _tidy(self) -> None:
         """Remove what this command left unfinished here, and the folder where no other did."""
-        for path in (self.folder / UNFINISHED).glob(f"{self.command}_*"):
-            Checkpoint(path, self.digest).clear()
-        with suppress(OSError):
+        with suppress(OSError):  # what is kept may be where nothing may be written
+            for path in (self.folder / UNFINISHED).glob(f"{self.command}_*"):
+                Checkpoint(path, self.digest).clear()
             (self.folder / UNFINISHED).rmdir()
 
     def _content(self) -> dict[str, object]:

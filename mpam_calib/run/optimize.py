@@ -11,7 +11,7 @@ from mpam_calib.design.problem import R_BR
 from mpam_calib.design.robust import Optimiser, designs_table
 from mpam_calib.errors import InputError
 from mpam_calib.posterior.stored import load_run
-from mpam_calib.run.files import write_csv
+from mpam_calib.run.files import demand_writable, write_csv
 from mpam_calib.thesis.chapter3 import MONOFILAMENTS
 from mpam_calib.thesis.tables import table
 from mpam_calib.units import KPA
@@ -31,6 +31,7 @@ def optimize_to_folder(run: Path, seed: int = 0) -> tuple[Path, Path]:
     from mpam_calib.report.designs import DesignsView, designs_page
 
     stored = load_run(run)
+    demand_writable(run)
     model = stored.model
     if model.setting is None:
         raise InputError(run / "run.json", "a material, not a muscle", "a run of a muscle")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mpam_calib.calibration import predict
 from mpam_calib.errors import InputError
 from mpam_calib.posterior.stored import load_run
-from mpam_calib.run.files import write_csv
+from mpam_calib.run.files import demand_writable, write_csv
 from mpam_calib.specimen.plausibility import HIGHEST_LEVEL_KPA
 from mpam_calib.units import KPA
 
@@ -59,6 +59,7 @@ def parse_pressures(text: str) -> Array:
 def predict_to_folder(run: Path, pressures_kPa: Array | None, seed: int | None = None) -> Path:
     """Write ``RUN/predictions.csv`` at pressures (the levels without), and return its path."""
     stored = load_run(run)
+    demand_writable(run)
     model = stored.model
     seed = stored.seed if seed is None else seed
     if model.chain is None:

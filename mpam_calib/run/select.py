@@ -10,7 +10,7 @@ from mpam_calib.criticism.select import Selection, select
 from mpam_calib.posterior.material import demand_other, material_of
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.report.selection import selection_page
-from mpam_calib.run.files import KEPT_FILE, demand_folder, demand_forces, write_csv
+from mpam_calib.run.files import KEPT_FILE, demand_forces, demand_own, demand_writable, write_csv
 from mpam_calib.run.folder import run_digest
 from mpam_calib.run.kept import Kept
 from mpam_calib.run.replaced import tell_replaced
@@ -32,7 +32,7 @@ def select_to_folder(
     What an interruption has left is gone on with. Raises ``InputError`` before anything is written.
     """
     specimen = read(source)
-    demand_folder(run, RUN_FILE, KEPT_FILE)
+    demand_own(run, RUN_FILE, KEPT_FILE)
     demand_other(specimen, run)
     material = material_of(specimen)
     digest = run_digest(
@@ -41,6 +41,7 @@ def select_to_folder(
     kept = Kept(run, "select", digest, FILES)
     if kept.finished():
         return None
+    demand_writable(run)
     demand_forces(specimen, "one to select on")
     tell_replaced(run, "selection")
     journal = Journal(kept.unfinished)
