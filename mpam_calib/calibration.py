@@ -16,6 +16,7 @@ from mpam_calib.posterior.checkpoint import Checkpoint
 from mpam_calib.posterior.collapsed import Collapsed, Guide
 from mpam_calib.posterior.convergence import ESS_WANTED
 from mpam_calib.posterior.draws import Draws, Reported, keep_draws, kept_for, reported
+from mpam_calib.posterior.early_root import without_early_roots
 from mpam_calib.posterior.material import material_of
 from mpam_calib.posterior.mode import Mode
 from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Sampling, sample
@@ -135,5 +136,5 @@ def calibrate(
         guide, modes = found
         target = replace(target, guide=guide)
     sampling = sample(target, modes, seed, max_steps, ess_wanted, checkpoint, listener)
-    draws = keep_draws(target, sampling, seed, kept_for(ess_wanted))
+    draws = without_early_roots(target, keep_draws(target, sampling, seed, kept_for(ess_wanted)), seed)
     return Calibration(specimen, target, sampling, draws, seed, ess_wanted)

@@ -29,8 +29,8 @@ def kept_for(ess_wanted: float) -> int:
 class Draws:
     """N draws, ensemble by ensemble: ``u`` (N, d) coordinates, ``values`` name → (N, 1) SI, ``eta`` (N, k).
 
-    ``chains`` is the number of ensembles; N is a multiple of it. ``index`` (N / chains,) tells which of each
-    ensemble's draws they are, where they come straight from sampling.
+    ``chains`` is the number of ensembles; N is a multiple of it. ``index`` (N / chains,), or (chains,
+    N / chains) where that differs, tells which of each ensemble's draws they are, where they are of sampling.
     """
 
     u: Array
@@ -46,7 +46,10 @@ class Draws:
         """At most ``count`` draws, evenly spaced."""
         if count >= len(self):
             return self
-        keep = np.linspace(0, len(self) - 1, count).astype(np.int64)
+        return self.take(np.linspace(0, len(self) - 1, count).astype(np.int64))
+
+    def take(self, keep: NDArray[np.int64]) -> Draws:
+        """The draws at some places, as if of one ensemble."""
         return Draws(self.u[keep], {k: v[keep] for k, v in self.values.items()}, self.eta[keep], 1)
 
 

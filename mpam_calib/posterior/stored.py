@@ -51,9 +51,10 @@ def write_draws(path: Path, draws: Draws, reported: Sequence[Reported], log_prob
     az = import_arviz()
     assert draws.index is not None
     shape = (draws.chains, len(draws) // draws.chains)
+    kept = np.broadcast_to(draws.index, shape)
     data = az.from_dict(
         posterior={item.name: item.draws.reshape(shape) for item in reported},
-        sample_stats={"lp": log_prob.reshape(draws.chains, -1)[:, draws.index]},
+        sample_stats={"lp": np.take_along_axis(log_prob.reshape(draws.chains, -1), kept, axis=1)},
         attrs={"inference_library": "emcee", "digest": digest},
     )
     sampler = {

@@ -15,6 +15,7 @@ from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
 from mpam_calib.posterior.draws import prior_draws
+from mpam_calib.posterior.early_root import early_roots
 from mpam_calib.posterior.material import material_folder
 from mpam_calib.posterior.stored import unconverged
 from mpam_calib.prediction.curves import contraction_grid
@@ -166,6 +167,12 @@ def _settings(calibration: Calibration) -> dict[str, str]:
 def _warnings(calibration: Calibration) -> list[str]:
     specimen, material = calibration.specimen, calibration.model.blueprint.material
     warnings = oddities(specimen)
+    early = early_roots(calibration.target, calibration.draws)
+    if early is not None and early.any():
+        warnings.append(
+            f"In {100.0 * early.mean():.0f} % of the draws the force is gone well short of a measured free "
+            "contraction: this simulation and these data contradict each other."
+        )
     if material is None:
         return warnings
     if material.strain_range is None:
