@@ -99,11 +99,12 @@ def _run() -> int:
     except typer.Abort as error:
         raise Interrupted from error
     except Exception as error:
-        # A wrong option: the parser knows how to say so.
-        message = getattr(error, "format_message", None)
-        if message is None:
+        # A wrong option: the parser knows what it is.
+        if not hasattr(error, "format_message"):
             raise
-        return _refused(" ".join(str(message()).split()))
+        from mpam_calib.cli.usage import usage_message
+
+        return _refused(usage_message(error))
     if code == INTERRUPTED:
         # The parser has swallowed Ctrl-C.
         raise Interrupted

@@ -6,6 +6,7 @@ import os
 import pty
 import re
 import shlex
+import signal
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ from pathlib import Path
 import pytest
 from specimen.folders import loops
 
+from mpam_calib.cli import main
 from mpam_calib.cli.app import ORDER
 from mpam_calib.cli.progress import sampling_progress
 from mpam_calib.posterior.sampling import Progress
@@ -105,6 +107,44 @@ def test_wrong_usage_is_one_line_and_exit_2(
     assert result.stdout == ""
     assert re.fullmatch(r"error: \S.*\n", result.stderr), result.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ("check", "SPECIMEN: found nothing, expected an argument (specimen folder, or its specimen.toml)"),
+        (
+            "calibrate",
+            "SPECIMEN: found nothing, expected an argument (specimen folder, or its specimen.toml)",
+        ),
+        ("calibrate x", "--output: found nothing, expected this option (folder to write, resume or keep)"),
+        ("simulate x -o y --hide", "--hide: found nothing, expected a value after it"),
+        ("calibrate x -o z --remainder=3", "--remainder: found a value, expected none"),
+        ("calibrate x -o z --seed one", '--seed: found "one", expected a valid integer'),
+        ("calibrate x -o z --seed=-1", '--seed: found "-1", expected greater than or equal to 0'),
+        ("--nonsense", "--nonsense: found an unknown option, expected one that --help lists"),
+        (
+            "calibrate x -o z --sed 1",
+            '--sed: found an unknown option (did you mean "--seed"?), expected one that --help lists',
+        ),
+        ("predict x y", "command line: found unexpected extra argument(s) (y), expected what --help lists"),
+        (
+            "calbrate",
+            'command line: found the unknown command "calbrate" (did you mean "calibrate"?), expected one of '
+            '"init", "check", "calibrate", "select", "diagnose", "predict", "optimize", "simulate", "reproduce"',
+        ),
+    ],
+)
+def test_wrong_usage_is_said_as_all_else_is(
+    arguments: str, said: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["mpam-calib", *arguments.split()])
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(SystemExit) as end:
+        main()
+    signal.signal(signal.SIGINT, before)
+    assert end.value.code == 2
+    assert capsys.readouterr().err == f"error: {said}\n"
 
 
 def test_a_misspelt_command_is_guessed() -> None:
