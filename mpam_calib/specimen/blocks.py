@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.misread import COMPARED, cut_off
 from mpam_calib.specimen.recording import BRANCH_WORDS
-from mpam_calib.specimen.tables import GAPPED_COLUMNS, TEXT_COLUMNS, TableSpec
+from mpam_calib.specimen.tables import EMPTY, GAPPED_COLUMNS, TEXT_COLUMNS, TableSpec
 from mpam_calib.specimen.text_format import TextFormat, is_number, refuse_other_than_text
 from mpam_calib.specimen.wording import did_you_mean, listed, quoted
 
@@ -174,7 +174,9 @@ def _frame(raw: bytes, form: TextFormat, *, text: bool) -> pd.DataFrame:
         str(field.position): "str" if text else ("category" if field.name in TEXT_COLUMNS else "float64")
         for field in fields
     }
-    gapped = {str(field.position): [""] for field in fields if field.name in GAPPED_COLUMNS and not text}
+    gapped = {
+        str(field.position): list(EMPTY) for field in fields if field.name in GAPPED_COLUMNS and not text
+    }
     frame: pd.DataFrame = pd.read_csv(
         io.BytesIO(raw),
         sep=form.delimiter,
@@ -219,7 +221,7 @@ def _first_bad_cell(label: str, lines: _Lines, form: TextFormat) -> tuple[int, s
     numeric = [name for name in frame.columns if name not in TEXT_COLUMNS]
     good = np.column_stack([frame[name].str.fullmatch(number, case=False).to_numpy(bool) for name in numeric])
     for name in GAPPED_COLUMNS.intersection(numeric):
-        good[:, numeric.index(name)] |= ~frame[name].str.strip().astype(bool).to_numpy()
+        good[:, numeric.index(name)] |= frame[name].str.lstrip().isin(EMPTY).to_numpy()
     wrong = np.argwhere(~good)
     if not len(wrong):
         raise InputError(

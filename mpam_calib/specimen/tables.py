@@ -20,6 +20,8 @@ TEXT_COLUMNS: Final = frozenset({"branch"})
 """Columns that hold words; every other column holds numbers."""
 GAPPED_COLUMNS: Final = frozenset({"temperature_C"})
 """Columns whose cells may be empty: an instrument slower than the load cell fills few rows."""
+EMPTY: Final = ("", "nan", "NaN", "NAN")
+"""What stands in such cells."""
 
 
 @dataclass(frozen=True)

@@ -131,7 +131,8 @@ def test_wrong_usage_is_one_line_and_exit_2(
         (
             "calbrate",
             'command line: found the unknown command "calbrate" (did you mean "calibrate"?), expected one of '
-            '"init", "check", "calibrate", "select", "diagnose", "predict", "optimize", "simulate", "reproduce"',
+            '"init", "check", "calibrate", "select", "diagnose", "predict", '
+            '"optimize", "simulate", "reproduce"',
         ),
     ],
 )

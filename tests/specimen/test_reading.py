@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mpam_calib.errors import InputError
 from mpam_calib.specimen import Specimen, read
 from mpam_calib.specimen.loops import one_after_the_other
 from mpam_calib.specimen.recording import Loops
@@ -153,6 +154,27 @@ def test_a_thermometer_may_be_slower_than_the_load_cell(tmp_path: Path, every: i
     assert read_back is not None
     last = (count - 1) // every * every
     np.testing.assert_allclose(read_back, np.minimum(true, true[last]))
+
+
+@pytest.mark.parametrize("word", ["nan", "NaN", "NAN", " NaN"])
+@pytest.mark.parametrize("first", [0, 1])
+def test_no_temperature_may_be_written_as_nan(tmp_path: Path, word: str, first: int) -> None:
+    """As an instrument or a program writes it that has none; in the first row as well."""
+    body = loops((50.0, 100.0)).text().splitlines()
+    rows = [f"{line},{word if i % 7 != first else 20.0 + 0.01 * i}" for i, line in enumerate(body[1:])]
+    text = "\n".join([body[0] + ",temperature_C", *rows]) + "\n"
+    found = loops_of(read(make(tmp_path, loops=text))).temperature_C
+    assert found is not None
+    known = np.arange(first, len(found), 7)
+    np.testing.assert_allclose(found[known], 20.0 + 0.01 * known)
+    assert np.isfinite(found).all()
+
+
+def test_nan_elsewhere_is_no_number(tmp_path: Path) -> None:
+    body = loops().text().splitlines()
+    body[9] = ",".join([*body[9].split(",")[:3], "nan"])
+    with pytest.raises(InputError, match=r'loops\.csv:10:force_N: found "nan", expected a number'):
+        read(make(tmp_path, loops="\n".join(body) + "\n"))
 
 
 def test_held_length_with_given_words(tmp_path: Path) -> None:
