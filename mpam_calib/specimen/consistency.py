@@ -45,9 +45,11 @@ def normalised_simulation(source: TomlSource, declaration: Declaration) -> Simul
 
 
 def unused(source: TomlSource, declaration: Declaration, used: Simulation) -> tuple[str, ...]:
-    """Remarks on keys of [simulation] that are declared, and that its moduli overrule."""
+    """Remarks on keys of [simulation] that are declared, and that its moduli or its friction overrule."""
     stated = source.tables.get("simulation", {})
-    return tuple(
+    by_pressure = used.friction == "none" and used.friction_by_pressure
+    none = ('simulation: friction_by_pressure = true is not used: friction is "none"',) if by_pressure else ()
+    return none + tuple(
         f"simulation: {name} = {json.dumps(getattr(declaration.simulation, name))} is not used: "
         f"the moduli make it {json.dumps(getattr(used, name))}"
         for name in ("order", "law", "strain", "friction")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mpam_calib.physics.kinematics import SHAPES, Rest
 from mpam_calib.physics.statics import gas_force, thickness_force
 from mpam_calib.specimen.declaration import Geometry
+from mpam_calib.specimen.motion import run_ids
 from mpam_calib.specimen.plausibility import longest_contraction
 from mpam_calib.specimen.recording import Floats, Loops, Specimen
 from mpam_calib.specimen.summary import BRANCH_NAMES, sampling_rates, stroke_speeds
@@ -52,6 +53,7 @@ def oddities(specimen: Specimen) -> list[str]:
             remarks.append(f"loops: {len(loops.force_N)} readings; so few hardly contradict any simulation")
         remarks += _odd_times(loops)
         remarks += _odd_speeds(loops)
+        remarks += _odd_cycles(loops)
         remarks += _odd_levels(loops, specimen.levels_Pa)
     if specimen.geometry is not None:
         remarks += _odd_forces(specimen) + _odd_signs(specimen)
@@ -102,6 +104,18 @@ def _odd_speeds(loops: Loops) -> list[str]:
         fastest = speeds.max() * MINUTE / MM
         remarks.append(f"loops: the crosshead moves at {fastest:.3g} mm/min; is time_s in seconds?")
     return remarks
+
+
+def _odd_cycles(loops: Loops) -> list[str]:
+    """Cycles that are numbered from the last to the first; a number that begins anew now and then is none."""
+    step = np.diff(loops.cycle)[np.diff(run_ids(loops.clock, loops.level)) == 0]
+    down, changes = int((step < 0).sum()), int((step != 0).sum())
+    if 2 * down <= changes:
+        return []
+    return [
+        f"loops: the column cycle counts down ({down} of {changes} changes within a level); does 1 stand for "
+        "the first cycle?"
+    ]
 
 
 def level_stray(loops: Loops, levels_Pa: Floats, index: int) -> float:

@@ -136,6 +136,37 @@ def test_a_tensile_test_in_megapascals(scale: float, odd: bool, tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
+    ("friction", "by_pressure", "said"),
+    [("none", "true", True), ("none", "false", False), ("coulomb", "true", False)],
+)
+def test_a_friction_for_each_pressure_of_none_is_said(
+    friction: str, by_pressure: str, said: bool, tmp_path: Path
+) -> None:
+    declared = f'friction = "{friction}"\nfriction_by_pressure = {by_pressure}'
+    text = DECLARATION.replace('friction = "coulomb"', declared)
+    found = " ".join(oddities(read(make(tmp_path, text, loops=loops().text()))))
+    assert ('friction_by_pressure = true is not used: friction is "none"' in found) == said
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        pytest.param(lambda n: n, False, id="up"),
+        pytest.param(lambda n: 4 - n, True, id="down"),
+        pytest.param(lambda n: 1 + (n + 1) % 3, False, id="once anew"),
+    ],
+)
+def test_cycles_that_count_down_are_said_to(number: Callable[[int], int], said: bool, tmp_path: Path) -> None:
+    made = loops(cycles=3)
+    lines = made.text().splitlines()
+    rows = [f"{line},{number(int(n))}" for line, n in zip(lines[1:], made.cycle, strict=True)]
+    text = "\n".join([lines[0] + ",cycle", *rows]) + "\n"
+    found = " ".join(oddities(read(make(tmp_path, loops=text))))
+    assert ("loops: the column cycle counts down (6 of 6 changes within a level)" in found) == said
+    assert ("counts down" in found) == said
+
+
+@pytest.mark.parametrize(
     ("simulation", "said"),
     [
         (
