@@ -25,7 +25,8 @@ def predict(
     """Predict force and free contraction at any pressures.
 
     Writes bands on force, blocked force and free contraction to RUN/predictions.csv, with the columns
-    of bands.csv; what lies beyond the data is marked there as extrapolated.
+    of bands.csv; what lies beyond the data is marked there as extrapolated, and outside the recorded
+    pressures bands widen with the distance.
     """
     from mpam_calib.run.predict import parse_pressures, predict_to_folder
 

@@ -18,6 +18,7 @@ from mpam_calib.model.model import Model
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import SMOOTH
 from mpam_calib.posterior.draws import Draws
+from mpam_calib.prediction.beyond import Beyond
 from mpam_calib.prediction.curves import GRID, first_root
 from mpam_calib.specimen.declaration import Braid
 from mpam_calib.units import DEG, GPA, MM, si_factor
@@ -36,12 +37,14 @@ class MuscleDraws:
     """A model with N draws of its posterior and of the tolerances to which a new muscle is built.
 
     ``tolerance``: SI deviations (N, 1) from the drawing, by the names of the geometry's values. What
-    the run found of its own specimen's geometry, or of its rig, is not carried over.
+    the run found of its own specimen's geometry, or of its rig, is not carried over. ``beyond``: what is
+    not known outside the recorded pressures.
     """
 
     model: Model
     draws: Draws
     tolerance: dict[str, Array]
+    beyond: Beyond | None
 
     @classmethod
     def prepare(cls, model: Model, draws: Draws, count: int, seed: int) -> MuscleDraws:
@@ -53,7 +56,7 @@ class MuscleDraws:
         tolerance = {
             name: float(sd) * si_factor(name) * _deviates(len(few), rng)[:, None] for name, sd in sds.items()
         }
-        return cls(model, few, tolerance)
+        return cls(model, few, tolerance, Beyond.draw(model, few, seed))
 
     def __len__(self) -> int:
         return len(self.draws)
@@ -85,7 +88,10 @@ class MuscleDraws:
         force = chain.force(values, self.draws.eta[:, :p], readings)
         if self.model.remainder is not None:
             left = self.draws.eta[:, p : p + q] @ self.model.remainder.columns(readings).T
-            force = force + self.draws.values[SMOOTH] * left * self._share(x)
+            left = self.draws.values[SMOOTH] * left
+            if self.beyond is not None:
+                left = left + self.beyond.force(readings)
+            force = force + left * self._share(x)
         return force
 
     def _chain(self, x: Array) -> Chain:

@@ -84,6 +84,22 @@ class Remainder:
         result: Array = along * across * side * self.weights
         return result
 
+    @property
+    def degrees(self) -> int:
+        """Number of functions :meth:`along` the contraction."""
+        return int(self.index[:, 0].max()) + 1
+
+    def along(self, displacement: Array) -> Array:
+        """Basis of a function of the contraction alone, (n, degrees), at displacements (m), for 1 N.
+
+        The same polynomials and weights as the surface's, for what knows neither pressure nor branch.
+        """
+        degree = np.arange(self.degrees)
+        weights = 1.0 / (1.0 + degree)
+        weights /= np.sqrt(np.sum(weights**2 / (2.0 * degree + 1.0)))
+        basis: Array = weights * _legendre(displacement / self.geometry_length / self.span, degree)
+        return basis
+
 
 def _legendre(share: Array, degree: NDArray[np.int64]) -> Array:
     """Polynomials (n, k) on 0 … 1; beyond, where they would run away, they stay what they are at the edge."""

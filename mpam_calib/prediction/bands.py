@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -9,7 +11,15 @@ from numpy.typing import NDArray
 from mpam_calib.model.model import Model
 from mpam_calib.model.tensile import MISFIT, NOISE
 from mpam_calib.posterior.draws import Draws
-from mpam_calib.prediction.curves import BRANCHES, Curves, Reach, contraction_grid, first_root, force_curves
+from mpam_calib.prediction.curves import (
+    BRANCHES,
+    Curves,
+    Reach,
+    contraction_grid,
+    first_root,
+    force_curves,
+    pressure_rng,
+)
 from mpam_calib.units import KPA
 
 Array = NDArray[np.float64]
@@ -37,34 +47,37 @@ ROOTLESS = 0.05
 def muscle_bands(model: Model, draws: Draws, pressures: Array, seed: int, trim: bool = True) -> pd.DataFrame:
     """Bands on force, blocked force and free contraction at pressures (Pa), each also ``_observed``.
 
-    Curves end at the first grid point at or beyond the mean free contraction (``trim``).
+    Curves end at the first grid point at or beyond the mean free contraction (``trim``). A pressure's bands
+    are the same whichever others are asked for.
     """
     reach = Reach.of(model.blueprint)
     grid = contraction_grid(model, float(reach.contraction.max()))
     curves = force_curves(model, draws.thin(DRAWS), pressures, grid, seed)
-    rng = np.random.default_rng([seed, 5])
+    noise = [_Noise.draw(curves, j, pressure_rng(seed, 5, P)) for j, P in enumerate(pressures)]
     free = first_root(grid, curves.force[:, :, 2])
     outside = reach.outside(pressures)
     at = pressures[:, None]
     unseen = reach.beyond(at, grid) | reach.before(at, grid) | outside[:, None]
     parts = []
     for observed in (False, True):
-        noise = curves.noise.draw(curves.force[:, :, 2], rng) if observed else 0.0
+        curve = np.stack([each.curve for each in noise], axis=1) if observed else 0.0
         suffix = "_observed" if observed else ""
         for j, branch in enumerate(BRANCHES):
-            table = _table(f"force_N{suffix}", pressures, grid, branch, curves.force[:, :, j] + noise)
+            table = _table(f"force_N{suffix}", pressures, grid, branch, curves.force[:, :, j] + curve)
             table["extrapolated"] = unseen.ravel()
             if trim:
                 end = np.searchsorted(grid, free.mean(axis=0) - 1e-12)
                 table = table[(np.arange(len(grid))[None, :] <= end[:, None]).ravel()]
             parts.append(table)
-        parts.append(_blocked(curves, suffix, rng).assign(extrapolated=unseen[:, 0]))
-        contraction = free
+        blocked, contraction = curves.force[:, :, 2, 0], free
         if observed:
+            blocked = blocked + np.stack([each.blocked for each in noise], axis=1)
             # The cell's noise moves the point where the force is read as zero.
-            shifted = curves.force[:, :, 2] + curves.noise.draw(np.zeros((*free.shape, 1)), rng)
-            own = curves.contraction_noise[:, None] * rng.standard_normal(free.shape)
+            shifted = curves.force[:, :, 2] + np.stack([each.zero for each in noise], axis=1)
+            own = np.stack([each.contraction for each in noise], axis=1)
             contraction = np.maximum(first_root(grid, shifted) + own, 0.0)
+        table = _table(f"blocked_force_N{suffix}", pressures, np.zeros(1), "", blocked[:, :, None])
+        parts.append(table.assign(extrapolated=unseen[:, 0]))
         table = _table(f"free_contraction{suffix}", pressures, np.zeros(1), "", contraction[:, :, None])
         # A curve that never reaches zero ends at the grid's edge: that is no free contraction.
         rootless = np.mean(free >= grid[-1], axis=0) > ROOTLESS
@@ -73,11 +86,28 @@ def muscle_bands(model: Model, draws: Draws, pressures: Array, seed: int, trim: 
     return pd.concat(parts, ignore_index=True)[COLUMNS]
 
 
-def _blocked(curves: Curves, suffix: str, rng: np.random.Generator) -> pd.DataFrame:
-    blocked = curves.force[:, :, 2, 0]
-    if suffix:
-        blocked = blocked + curves.noise.draw(blocked, rng)
-    return _table(f"blocked_force_N{suffix}", curves.pressures, np.zeros(1), "", blocked[:, :, None])
+@dataclass(frozen=True)
+class _Noise:
+    """What new readings at one pressure add to N draws.
+
+    Along a curve (N, γ), to a blocked force (N,) and where the force is zero (N, 1), all in newtons; and to a
+    free contraction (N,).
+    """
+
+    curve: Array
+    blocked: Array
+    zero: Array
+    contraction: Array
+
+    @classmethod
+    def draw(cls, curves: Curves, j: int, rng: np.random.Generator) -> _Noise:
+        """For the j-th pressure of the curves."""
+        force = curves.force[:, j, 2]
+        noise, zero = curves.noise, np.zeros((len(force), 1))
+        return cls(
+            noise.draw(force, rng), noise.draw(force[:, 0], rng), noise.draw(zero, rng),
+            curves.contraction_noise * rng.standard_normal(len(force)),
+        )  # fmt: skip
 
 
 def stress_bands(model: Model, draws: Draws, seed: int) -> pd.DataFrame:

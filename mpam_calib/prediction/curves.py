@@ -17,6 +17,7 @@ from mpam_calib.physics.statics import gas_force, thickness_force
 from mpam_calib.posterior.covariance import ROUGH_LENGTH
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.posterior.target import predict_force
+from mpam_calib.prediction.beyond import Beyond
 from mpam_calib.prediction.reading_noise import ReadingNoise
 
 Array = NDArray[np.float64]
@@ -67,7 +68,9 @@ def contraction_grid(model: Model, reach: float) -> Array:
 def force_curves(model: Model, draws: Draws, pressures: Array, contractions: Array, seed: int) -> Curves:
     """Curves at pressures (Pa, the gauge's reading) and contractions, for every draw.
 
-    The muscle is settled: after many cycles, just after the level was reached, at the reference speed.
+    The muscle is settled: after many cycles, just after the level was reached, at the reference speed. Below
+    and above all levels the remainder is that of :mod:`~mpam_calib.prediction.beyond`. A pressure's draws
+    are the same whichever others are asked for.
     """
     assert model.setting is not None
     L0 = model.setting.geometry.L0
@@ -80,30 +83,39 @@ def force_curves(model: Model, draws: Draws, pressures: Array, contractions: Arr
     for i in range(0, len(draws), size):
         values = {k: v[i : i + size] for k, v in draws.values.items()}
         parts.append(predict_force(model, values, draws.eta[i : i + size], readings))
-    force = np.concatenate(parts).reshape(len(draws), *shape)
-    rng = np.random.default_rng([seed, 4])
+    force = np.concatenate(parts)
+    if (beyond := Beyond.draw(model, draws, seed)) is not None:
+        force += beyond.force(readings)
+    force = force.reshape(len(draws), *shape)
     if ROUGH in draws.values:
-        force = force + _stroke_remainder(model, draws, contractions, shape, rng)
+        for j, pressure in enumerate(pressures):
+            force[:, j] += _stroke_remainder(model, draws, contractions, pressure_rng(seed, 4, pressure))
     zero = np.zeros(len(draws))
     own = draws.values[CONTRACTION_SD][:, 0] if CONTRACTION_SD in draws.values else zero
     noise = ReadingNoise(draws.values, model.setting.force_scale)
     return Curves(pressures, contractions, force, noise, own)
 
 
-def _stroke_remainder(
-    model: Model, draws: Draws, contractions: Array, shape: tuple[int, ...], rng: np.random.Generator
-) -> Array:
-    """A new stroke's own remainder: an exponential kernel along the contraction, apart for each branch."""
+def pressure_rng(seed: int, stream: int, pressure: float) -> np.random.Generator:
+    """Random numbers of one pressure (Pa): the same whichever others are asked for beside it."""
+    return np.random.default_rng([seed, stream, round(float(pressure)) % 2**32])
+
+
+def _stroke_remainder(model: Model, draws: Draws, contractions: Array, rng: np.random.Generator) -> Array:
+    """A new stroke's own remainder (N, 3, γ) at one pressure: an exponential kernel along the contraction.
+
+    Apart for each branch.
+    """
     assert model.setting is not None
     length = ROUGH_LENGTH * model.setting.stroke / model.setting.geometry.L0
     rho = np.exp(-np.diff(contractions) / length)
-    z = rng.standard_normal((len(draws), shape[0], 2, shape[2]))
+    z = rng.standard_normal((len(draws), 2, len(contractions)))
     path = np.empty_like(z)
     path[..., 0] = z[..., 0]
     for i, r in enumerate(rho):
         path[..., i + 1] = r * path[..., i] + np.sqrt(1.0 - r**2) * z[..., i + 1]
-    path *= draws.values[ROUGH][:, :, None, None]
-    return np.concatenate([path, path.mean(axis=2, keepdims=True)], axis=2)
+    path *= draws.values[ROUGH][:, :, None]
+    return np.concatenate([path, path.mean(axis=1, keepdims=True)], axis=1)
 
 
 def first_root(contractions: Array, force: Array) -> Array:

@@ -207,8 +207,8 @@ def _trust(view: DesignsView) -> Verdict:
     if outside.size:
         reasons.append(
             f"{', '.join(f'{p:.0f}' for p in outside)} kPa lie outside the recorded pressures: the moduli's "
-            f"law ({law.replace('_', ' ')}) is extrapolated, {LAWS[law]}, and the bands hold the law's "
-            "constants, not the doubt about its shape."
+            f"law ({law.replace('_', ' ')}) is extrapolated, {LAWS[law]}. The bands hold its constants and "
+            "a misfit that grows with the distance from the recorded pressures, not more about its shape."
         )
     far = [d for d in view.best("II") if bool(view.reach.beyond(np.array(d.P), d.contraction.mean()))]
     if far:
