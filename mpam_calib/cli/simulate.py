@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -37,6 +38,8 @@ def simulate(
     real = read(specimen, data_required=False)
     made = make(real, _sizes([*(hide or []), *(more or [])]), seed)
     write_specimen(made, source, output)
+    for name in made.not_shown:
+        print(f"warning: {name} changes no force that this recording could show", file=sys.stderr)
     left = [file.name for file in real.files if file.kind in ("blocked_force", "free_contraction")]
     if left:
         print(f"not simulated: {', '.join(left)}")

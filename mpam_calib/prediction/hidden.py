@@ -92,15 +92,15 @@ def with_hidden(
     return build_model(blueprint), hidden
 
 
-def demand_shown(
+def not_shown(
     model: Model,
     values: dict[str, Array],
     eta: Array,
     rows: list[Readings],
     hide: Mapping[str, float | None],
     floor: float | None,
-) -> None:
-    """Raise ``InputError`` for a hidden effect without which the forces at the rows would be the same.
+) -> tuple[str, ...]:
+    """The hidden effects without which nobody could tell the forces at the rows from what they are.
 
     Each by itself, beside the others; a force below the ``floor`` (N) is not read.
     """
@@ -112,11 +112,11 @@ def demand_shown(
 
     noise = float(np.hypot(values[WHITE], values.get(CORRELATED, 0.0))[0, 0])
     simulation = model.blueprint.simulation
-    for declared, size in hide.items():
+    unseen = []
+    for declared in hide:
         others = tuple(each for each in simulation.effects if each != declared)
         rest = simulation.model_copy(update={"effects": others})
         without = build_model(model.blueprint.model_copy(update={"simulation": rest}))
         if float(np.linalg.norm(recorded(model) - recorded(without))) < SEEN * noise:
-            shown = declared if size is None else f"{declared}={size:g}"
-            found = f"{shown}, which this recording cannot show"
-            raise InputError(PLACE, found, "an effect that changes the forces at its rows")
+            unseen.append(declared)
+    return tuple(unseen)

@@ -19,7 +19,7 @@ from mpam_calib.posterior.material import material_of
 from mpam_calib.posterior.row_motion import row_readings
 from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.curves import contraction_grid, first_root
-from mpam_calib.prediction.hidden import checked_sizes, demand_shown, with_hidden
+from mpam_calib.prediction.hidden import checked_sizes, not_shown, with_hidden
 from mpam_calib.prediction.protocol import LEVELS, thesis_protocol
 from mpam_calib.specimen.arguments import demand_specimen, demand_whole
 from mpam_calib.specimen.recording import ForceMap, Loops, Specimen
@@ -42,12 +42,14 @@ NOT_PUT_IN = (NOISE, CONTRACTION_SD)
 class Simulated:
     """Synthetic recordings and the truth behind them (lab units).
 
-    ``parameters`` holds all that was put in, under the names of ``summary.csv``.
+    ``parameters`` holds all that was put in, under the names of ``summary.csv``; ``not_shown`` are hidden
+    effects that change no force that anybody could tell.
     """
 
     specimen: Specimen
     hidden: dict[str, dict[str, float]]
     parameters: dict[str, float]
+    not_shown: tuple[str, ...]
 
 
 def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None, seed: int = 0) -> Simulated:
@@ -57,8 +59,7 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
     protocol. ``hide`` maps effects (``id``, or ``id:form`` for another author's equation, whose own
     parameters are typical) to a size in lab units (None: a typical one). Uncertain geometry and a gauge's
     offset stay as declared. Raises ``InputError`` for an effect that is unknown, is part of the simulation,
-    has no size to hide, lacks what it needs or changes no force that anybody could tell, and for a size that
-    its prior all but rules out.
+    has no size to hide or lacks what it needs, and for a size that its prior all but rules out.
     """
     demand_specimen(specimen)
     demand_whole("--seed", seed, 0)
@@ -98,7 +99,7 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
     floor = specimen.sensors.force_floor_N
     rows = [] if loops is None else [row_readings(loops)]
     rows += [] if grid is None else [_map_readings(grid, specimen)]
-    demand_shown(model, values, eta, rows, hide, floor)
+    unseen = not_shown(model, values, eta, rows, hide, floor)
     if loops is not None:
         force = model.chain.force(values, eta, rows[0])[0]
         assert model.setting is not None
@@ -115,7 +116,7 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
         free_contraction=None,
         tensile=specimen.tensile,
     )
-    return Simulated(result, hidden, _put_in(model, values, eta))
+    return Simulated(result, hidden, _put_in(model, values, eta), unseen)
 
 
 def _mode(

@@ -52,6 +52,8 @@ def write_specimen(simulated: Simulated, source: Path, folder: Path) -> None:
     text = "# SYNTHETIC: made by a simulation, not by a rig.\n" + tomlkit.dumps(document)
     write_atomically(folder / SPECIMEN_FILE, lambda p: p.write_text(text, encoding="utf-8"))
     truth = {"hidden": simulated.hidden, "parameters": simulated.parameters}
+    if simulated.not_shown:
+        truth["not_shown"] = list(simulated.not_shown)
     write_json(truth, folder / TRUTH)
 
 
