@@ -94,3 +94,16 @@ def test_only_sets_that_may_lead_are_gone_through(problem: Problem) -> None:
     found.over_forms()
     assert set(found.in_forms) == {frozenset({cause})}
     assert all(causes_of(f) == {cause} for f in found.in_forms[frozenset({cause})])
+
+
+@pytest.mark.parametrize("further", [True, False])
+def test_what_has_a_further_cause_may_be_left_as_it_is(problem: Problem, further: bool) -> None:
+    size, u = HIDDEN["force_drift"]
+    made = problem.with_force(
+        force_with(problem, fit(problem, frozenset(), 0), "force_drift", {size: 40 * u})
+    )
+    found, both = searched(made, *HIDDEN), frozenset(HIDDEN)
+    assert found.sets[0] == {"force_drift"} and found.score(both) > found.score(found.sets[0]) - CLOSE
+    found.over_forms(further)
+    assert frozenset({"force_drift"}) in found.in_forms
+    assert (both in found.in_forms) == further
