@@ -19,11 +19,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mpam_calib.criticism.data.problem import build_problem
 from mpam_calib.criticism.diagnose import describe, diagnose
-from mpam_calib.criticism.held_out import hold_out_each
-from mpam_calib.criticism.problem import build_problem
-from mpam_calib.criticism.ranking import fitted
-from mpam_calib.criticism.spread import spread_over
+from mpam_calib.criticism.selection.held_out import hold_out_each
+from mpam_calib.criticism.selection.ranking import fitted
+from mpam_calib.criticism.tasks.spread import spread_over
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen

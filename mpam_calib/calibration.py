@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
 from mpam_calib.model.model import Model
-from mpam_calib.posterior.checkpoint import Checkpoint
-from mpam_calib.posterior.collapsed import Collapsed, Guide
-from mpam_calib.posterior.convergence import ESS_WANTED
+from mpam_calib.posterior.chains.checkpoint import Checkpoint
+from mpam_calib.posterior.chains.convergence import ESS_WANTED
+from mpam_calib.posterior.chains.sampling import MAX_STEPS, Listener, Sampling, sample
+from mpam_calib.posterior.density.collapsed import Collapsed, Guide
+from mpam_calib.posterior.density.mode import Mode
+from mpam_calib.posterior.density.target import build_target, locate
 from mpam_calib.posterior.draws import Draws, Reported, keep_draws, kept_for, reported
 from mpam_calib.posterior.early_root import without_early_roots
 from mpam_calib.posterior.material import material_of
-from mpam_calib.posterior.mode import Mode
-from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Sampling, sample
 from mpam_calib.posterior.summary import all_converged, summarise
-from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.bands import muscle_bands, stress_bands
 from mpam_calib.specimen.arguments import (
     demand_number,

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from mpam_calib.cli import stop_where_pressed
 
 if TYPE_CHECKING:
-    from mpam_calib.posterior.sampling import Listener
-    from mpam_calib.posterior.sampling import Progress as Figures
+    from mpam_calib.posterior.chains.sampling import Listener
+    from mpam_calib.posterior.chains.sampling import Progress as Figures
 
 
 @contextmanager

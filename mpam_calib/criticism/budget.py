@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from mpam_calib.criticism.fit import Fit
-from mpam_calib.criticism.problem import SIZES, Problem
-from mpam_calib.criticism.refits import Set, best_of, ended, named_forms
-from mpam_calib.criticism.searched import Search
+from mpam_calib.criticism.data.problem import SIZES, Problem
+from mpam_calib.criticism.fitting.fit import Fit
+from mpam_calib.criticism.fitting.predicted import beyond_noise
+from mpam_calib.criticism.fitting.refits import Set, best_of, ended, named_forms
+from mpam_calib.criticism.searching.searched import Search
 
 Array = NDArray[np.float64]
-
-TELLING = 2.0
-"""Rows tell of a misfit while their noise's sd is at most this many times the typical row's."""
 
 
 @dataclass(frozen=True)
@@ -30,16 +28,6 @@ class Budget:
     remainder: float
     noise: float
     shares: dict[str, float]
-
-
-def beyond_noise(residual: Array, variance: Array) -> float:
-    """Mean square (N²) of residuals (n,) beyond the noise's variances (n,).
-
-    Rows that nothing can be read from, their noise far above the typical (the crosshead rested there), are
-    left out: their doubt would pass for noise of all the others.
-    """
-    telling = variance <= TELLING**2 * np.median(variance)
-    return max(float(np.mean(residual[telling] ** 2 - variance[telling])), 0.0)
 
 
 def structured(problem: Problem, force: Array) -> float:

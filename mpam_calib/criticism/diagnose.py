@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 
 from mpam_calib.criticism.budget import Budget, misfit_budget
-from mpam_calib.criticism.candidates import Candidates, candidates
+from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
+from mpam_calib.criticism.fitting.refits import Set
 from mpam_calib.criticism.gain import Gain, measure_gain
-from mpam_calib.criticism.journal import Journal, journalled
 from mpam_calib.criticism.limits import Band, hidden_sizes
-from mpam_calib.criticism.problem import SIZES, Problem, build_problem
-from mpam_calib.criticism.refits import Set
-from mpam_calib.criticism.search import search
-from mpam_calib.criticism.searched import LARGEST, Search
+from mpam_calib.criticism.searching.candidates import Candidates, candidates
+from mpam_calib.criticism.searching.search import search
+from mpam_calib.criticism.searching.searched import LARGEST, Search
+from mpam_calib.criticism.searching.usual_braid import SHAPE_ALONE, need_strands, with_strands
 from mpam_calib.criticism.sizes import Sizes, sizes_of
-from mpam_calib.criticism.structure import Structure, structure_tests
-from mpam_calib.criticism.usual_braid import SHAPE_ALONE, need_strands, with_strands
+from mpam_calib.criticism.tasks.journal import Journal, journalled
+from mpam_calib.criticism.unexplained.structure import Structure, structure_tests
 from mpam_calib.criticism.verdict import Verdict, judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint

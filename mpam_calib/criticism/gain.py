@@ -14,20 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.criticism.candidates import HISTORY
-from mpam_calib.criticism.fit import Fit
-from mpam_calib.criticism.folds import FEWEST, folds_of, log_densities, total
-from mpam_calib.criticism.journal import Journal
-from mpam_calib.criticism.predicted import predict_rows
-from mpam_calib.criticism.problem import SIZES, Problem
-from mpam_calib.criticism.refits import Set, causes_of
-from mpam_calib.criticism.search import search
+from mpam_calib.criticism.data.problem import SIZES, Problem
+from mpam_calib.criticism.fitting.fit import Fit
+from mpam_calib.criticism.fitting.folds import FEWEST, Z90, folds_of, log_densities, total
+from mpam_calib.criticism.fitting.predicted import predict_rows
+from mpam_calib.criticism.fitting.refits import Set, causes_of
+from mpam_calib.criticism.searching.candidates import HISTORY
+from mpam_calib.criticism.searching.search import search
+from mpam_calib.criticism.tasks.journal import Journal
 from mpam_calib.criticism.verdict import judge
 
 Array = NDArray[np.float64]
 
 FOLD_WIDTH = 3
-Z90 = 1.6449
 
 
 @dataclass(frozen=True)

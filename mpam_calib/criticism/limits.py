@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import integrate, interpolate, linalg
 
-from mpam_calib.criticism.climb import Climb, Place, furthest_of
-from mpam_calib.criticism.fit import Fit, chain_for, doubt_about
-from mpam_calib.criticism.problem import Problem
-from mpam_calib.criticism.refits import ended, named_forms
-from mpam_calib.criticism.spread import Alone, Spread, held_problem
+from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.fitting.climb import Climb, Place, furthest_of
+from mpam_calib.criticism.fitting.fit import Fit, chain_for, doubt_about
+from mpam_calib.criticism.fitting.refits import ended, named_forms
+from mpam_calib.criticism.tasks.spread import Alone, Spread, held_problem
 from mpam_calib.model.effect import effect
 
 Array = NDArray[np.float64]

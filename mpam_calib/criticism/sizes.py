@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from mpam_calib.criticism.fit import Fit
-from mpam_calib.criticism.refits import Set, named_forms
-from mpam_calib.criticism.searched import Search
+from mpam_calib.criticism.fitting.fit import Fit
+from mpam_calib.criticism.fitting.refits import Set, named_forms
+from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.model.effect import effect
 from mpam_calib.model.state import Setting
 

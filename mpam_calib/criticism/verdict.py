@@ -8,14 +8,14 @@ from typing import Literal
 import numpy as np
 
 from mpam_calib.criticism.budget import remainder_rms, structured
-from mpam_calib.criticism.faults import FAULTLESS, Faults, faults_of
-from mpam_calib.criticism.fit import Fit, by_equations
-from mpam_calib.criticism.free_strokes import score_beside
-from mpam_calib.criticism.load_cell import NO_RIVAL, load_cell_rival
-from mpam_calib.criticism.problem import SIZES, Problem
-from mpam_calib.criticism.refits import Set
-from mpam_calib.criticism.searched import Search
-from mpam_calib.criticism.structure import Structure, structure_tests
+from mpam_calib.criticism.data.problem import SIZES, Problem
+from mpam_calib.criticism.fitting.fit import Fit, by_equations
+from mpam_calib.criticism.fitting.refits import Set
+from mpam_calib.criticism.searching.searched import Search
+from mpam_calib.criticism.unexplained.faults import FAULTLESS, Faults, faults_of
+from mpam_calib.criticism.unexplained.free_strokes import score_beside
+from mpam_calib.criticism.unexplained.load_cell import NO_RIVAL, load_cell_rival
+from mpam_calib.criticism.unexplained.structure import Structure, structure_tests
 
 Word = Literal["adequate", "named", "ambiguous", "unexplained"]
 

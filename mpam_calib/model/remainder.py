@@ -3,8 +3,8 @@
 δ(contraction, pressure, branch) = amplitude · Σ w_i φ_i η_i with η ~ N(0, I): Legendre polynomials along
 the contraction × such in pressure × {both branches alike, branches apart}, weights falling with the
 degree. (Half-waves would be level at full length, where the blocked force is read.) A second, rougher part
-belongs to each stroke alone (:mod:`mpam_calib.posterior.bins` carries its kernel); together they keep the
-bands honest where the model is wrong.
+belongs to each stroke alone (:mod:`mpam_calib.posterior.likelihood.bins` carries its kernel); together they
+keep the bands honest where the model is wrong.
 """
 
 from __future__ import annotations

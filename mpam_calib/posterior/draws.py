@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.model import Model
-from mpam_calib.posterior.batch import batch_size
-from mpam_calib.posterior.collapsed import Collapsed
-from mpam_calib.posterior.pool import held_target, workers
-from mpam_calib.posterior.sampling import Sampling
+from mpam_calib.posterior.chains.sampling import Sampling
+from mpam_calib.posterior.density.batch import batch_size
+from mpam_calib.posterior.density.collapsed import Collapsed
+from mpam_calib.posterior.density.pool import held_target, workers
 from mpam_calib.units import KPA, si_factor
 
 Array = NDArray[np.float64]

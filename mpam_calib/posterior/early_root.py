@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.model import CONTRACTION_SD
 from mpam_calib.model.readings import Readings
-from mpam_calib.posterior.collapsed import Collapsed
+from mpam_calib.posterior.density.collapsed import Collapsed
+from mpam_calib.posterior.density.target import predict_force
 from mpam_calib.posterior.draws import Draws
-from mpam_calib.posterior.points import FREE
-from mpam_calib.posterior.target import predict_force
+from mpam_calib.posterior.likelihood.points import FREE
 
 SHORT_SDS, STEP = 5.0, 0.005
 """Sds of a contraction's noise, and steps of the curves' grid, by which a first root is clearly short."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from mpam_calib.posterior.convergence import RHAT_LIMIT
+from mpam_calib.posterior.chains.convergence import RHAT_LIMIT
+from mpam_calib.posterior.chains.effective import ess_bulk, ess_tail, rhat
+from mpam_calib.posterior.chains.sampling import Sampling
 from mpam_calib.posterior.draws import Reported
-from mpam_calib.posterior.effective import ess_bulk, ess_tail, rhat
-from mpam_calib.posterior.sampling import Sampling
 
 COLUMNS = [
     "parameter",

@@ -14,9 +14,9 @@ from mpam_calib.model.reference import geometric_contraction, rest_of
 from mpam_calib.model.remainder import ROUGH
 from mpam_calib.physics.kinematics import SHAPES
 from mpam_calib.physics.statics import gas_force, thickness_force
-from mpam_calib.posterior.covariance import ROUGH_LENGTH
+from mpam_calib.posterior.density.target import predict_force
 from mpam_calib.posterior.draws import Draws
-from mpam_calib.posterior.target import predict_force
+from mpam_calib.posterior.likelihood.covariance import ROUGH_LENGTH
 from mpam_calib.prediction.beyond import Beyond
 from mpam_calib.prediction.reading_noise import ReadingNoise
 

@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 from mpam_calib.arviz_import import import_arviz
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import ROUGH
-from mpam_calib.posterior.batch import batch_size
-from mpam_calib.posterior.collapsed import Collapsed
+from mpam_calib.posterior.chains.weighing import laplace_mixture
+from mpam_calib.posterior.density.batch import batch_size
+from mpam_calib.posterior.density.collapsed import Collapsed
+from mpam_calib.posterior.density.mode import climb_modes, evaluate
+from mpam_calib.posterior.density.target import predict_force, without_level
 from mpam_calib.posterior.draws import Draws
-from mpam_calib.posterior.floor import pulling
-from mpam_calib.posterior.mode import climb_modes, evaluate
-from mpam_calib.posterior.points import KINDS
-from mpam_calib.posterior.row_motion import row_readings
-from mpam_calib.posterior.target import predict_force, without_level
-from mpam_calib.posterior.weighing import laplace_mixture
+from mpam_calib.posterior.likelihood.floor import pulling
+from mpam_calib.posterior.likelihood.points import KINDS
+from mpam_calib.posterior.likelihood.row_motion import row_readings
 from mpam_calib.prediction.reading_noise import ReadingNoise
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import KPA

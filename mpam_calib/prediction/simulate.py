@@ -14,10 +14,10 @@ from mpam_calib.model.model import CONTRACTION_SD, Model, build_model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.tensile import NOISE
+from mpam_calib.posterior.density.target import build_target, locate
 from mpam_calib.posterior.draws import Draws, reported
+from mpam_calib.posterior.likelihood.row_motion import row_readings
 from mpam_calib.posterior.material import material_of
-from mpam_calib.posterior.row_motion import row_readings
-from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.curves import contraction_grid, first_root
 from mpam_calib.prediction.hidden import checked_sizes, not_shown, with_hidden
 from mpam_calib.prediction.protocol import LEVELS, thesis_protocol

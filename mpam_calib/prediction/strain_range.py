@@ -10,8 +10,8 @@ from mpam_calib.model.model import Model
 from mpam_calib.model.reference import rest_of
 from mpam_calib.physics.kinematics import shape_inextensible_braid
 from mpam_calib.physics.statics import gas_force, modulus_columns, thickness_force
+from mpam_calib.posterior.density.target import build_target, locate
 from mpam_calib.posterior.draws import Draws
-from mpam_calib.posterior.target import build_target, locate
 from mpam_calib.prediction.curves import first_root
 from mpam_calib.specimen.declaration import Geometry
 from mpam_calib.specimen.recording import Specimen

@@ -7,11 +7,11 @@ import math
 import pandas as pd
 from markupsafe import Markup
 
-from mpam_calib.criticism.select import Selection
+from mpam_calib.criticism.selection.select import Selection
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.nuisance import nuisance_parameters
-from mpam_calib.posterior.floor import pulling
-from mpam_calib.posterior.points import KINDS, gather_points
+from mpam_calib.posterior.likelihood.floor import pulling
+from mpam_calib.posterior.likelihood.points import KINDS, gather_points
 from mpam_calib.report.choices import choices_section
 from mpam_calib.report.numbers import fixed, significant
 from mpam_calib.report.page import Block, DataTable, Headline, Notice, Page, Section, Text, Verdict

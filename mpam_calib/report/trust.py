@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from mpam_calib.posterior.convergence import RHAT_LIMIT
+from mpam_calib.posterior.chains.convergence import RHAT_LIMIT
 from mpam_calib.report.blocks import Level, Verdict
 from mpam_calib.report.doubts import Z90, look_first, overruled_slack, wandering
 from mpam_calib.report.held import (

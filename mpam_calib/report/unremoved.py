@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mpam_calib.criticism.load_cell import FAULT, RESCALED, ZEROED
+from mpam_calib.criticism.unexplained.load_cell import FAULT, RESCALED, ZEROED
 from mpam_calib.report.numbers import significant
 
 CELL_FAULTS = {

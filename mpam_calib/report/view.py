@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mpam_calib.posterior.convergence import ESS_WANTED
+from mpam_calib.posterior.chains.convergence import ESS_WANTED
 from mpam_calib.specimen.declaration import Simulation
 
 Floats = NDArray[np.float64]

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from mpam_calib.criticism.rows import telling_points, telling_strokes
-from mpam_calib.posterior.convergence import RHAT_LIMIT
-from mpam_calib.posterior.points import gather_points
+from mpam_calib.criticism.data.rows import telling_points, telling_strokes
+from mpam_calib.posterior.chains.convergence import RHAT_LIMIT
+from mpam_calib.posterior.likelihood.points import gather_points
 from mpam_calib.report.view import Convergence
 from mpam_calib.specimen.declaration import Simulation
 from mpam_calib.specimen.recording import Specimen

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from mpam_calib.calibration import calibrate
 from mpam_calib.model.blueprint import Options
-from mpam_calib.posterior.convergence import ESS_WANTED
+from mpam_calib.posterior.chains.convergence import ESS_WANTED
+from mpam_calib.posterior.chains.sampling import MAX_STEPS, Listener, Progress
 from mpam_calib.posterior.material import demand_other, material_of
-from mpam_calib.posterior.sampling import MAX_STEPS, Listener, Progress
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.run.files import KEPT_FILE, demand_own, demand_writable
 from mpam_calib.run.folder import REPORT, RunFolder, run_digest

@@ -14,7 +14,7 @@ import pandas as pd
 
 from mpam_calib.calibration import Calibration
 from mpam_calib.model.effect import effect, known_effects
-from mpam_calib.posterior.checkpoint import Checkpoint, sweep
+from mpam_calib.posterior.chains.checkpoint import Checkpoint, sweep
 from mpam_calib.posterior.stored import POSTERIOR, RUN_FILE, readable, write_draws
 from mpam_calib.run.files import CHECKPOINT, write_csv, write_json
 from mpam_calib.run.kept import written_over

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from mpam_calib.posterior.checkpoint import Checkpoint
+from mpam_calib.posterior.chains.checkpoint import Checkpoint
 from mpam_calib.run.files import KEPT_FILE, UNFINISHED, write_json
 
 

@@ -11,10 +11,10 @@ from mpam_calib.model.noise import WHITE
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import ROUGH
 from mpam_calib.model.tensile import MISFIT, NOISE
-from mpam_calib.posterior.bins import LoopBins
+from mpam_calib.posterior.density.target import predict_force
 from mpam_calib.posterior.draws import Draws
-from mpam_calib.posterior.points import KINDS, Points
-from mpam_calib.posterior.target import predict_force
+from mpam_calib.posterior.likelihood.bins import LoopBins
+from mpam_calib.posterior.likelihood.points import KINDS, Points
 from mpam_calib.prediction.curves import BATCH_CELLS
 from mpam_calib.prediction.fitted import fitted_force, fitted_stress, noise_of
 from mpam_calib.prediction.reading_noise import ReadingNoise

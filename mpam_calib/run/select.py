@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from mpam_calib.criticism.journal import Journal
-from mpam_calib.criticism.select import Selection, select
+from mpam_calib.criticism.selection.select import Selection, select
+from mpam_calib.criticism.tasks.journal import Journal
 from mpam_calib.posterior.material import demand_other, material_of
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.report.selection import selection_page

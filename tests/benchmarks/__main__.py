@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.posterior.convergence import diagnose_chains
-from mpam_calib.posterior.effective import ess_bulk
+from mpam_calib.posterior.chains.convergence import diagnose_chains
+from mpam_calib.posterior.chains.effective import ess_bulk
 
 from .problem import NAMES, as_rows, specimen
 

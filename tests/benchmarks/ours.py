@@ -8,8 +8,8 @@ import numpy as np
 
 import mpam_calib as mc
 from mpam_calib.model.blueprint import Options
+from mpam_calib.posterior.chains.sampling import BLOCK, Progress
 from mpam_calib.posterior.draws import keep_draws, reported
-from mpam_calib.posterior.sampling import BLOCK, Progress
 from mpam_calib.specimen import Specimen
 
 from .problem import NAMES

@@ -18,8 +18,8 @@ from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.catalogue.coulomb_friction import SCALE
 from mpam_calib.model.catalogue.dead_band import OWN_SD
 from mpam_calib.model.model import build_model
-from mpam_calib.posterior.row_motion import row_readings
-from mpam_calib.posterior.target import predict_force
+from mpam_calib.posterior.density.target import predict_force
+from mpam_calib.posterior.likelihood.row_motion import row_readings
 from mpam_calib.specimen.declaration import Braid, Csv, Fit, Geometry, Sensors, Simulation
 from mpam_calib.specimen.recording import Loops, Specimen
 

@@ -18,7 +18,7 @@ from specimen.folders import loops
 from mpam_calib.cli import main
 from mpam_calib.cli.app import ORDER
 from mpam_calib.cli.progress import sampling_progress
-from mpam_calib.posterior.sampling import Progress
+from mpam_calib.posterior.chains.sampling import Progress
 from mpam_calib.run.predict import parse_pressures
 
 COMMAND = [sys.executable, "-m", "mpam_calib"]
@@ -188,7 +188,7 @@ def test_a_closed_output_is_no_error(closed: str, command: str, tmp_path: Path) 
 BAR = """
 from mpam_calib.cli.app import ORDER
 from mpam_calib.cli.progress import sampling_progress
-from mpam_calib.posterior.sampling import Progress
+from mpam_calib.posterior.chains.sampling import Progress
 import time
 with sampling_progress(400) as tell:
     tell(Progress("warming up", 0, float("nan"), 0.0, 0.0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mpam_calib.criticism.rows import Rows
+from mpam_calib.criticism.data.rows import Rows
 
 from .test_hypotheses import problem_of, specimen_of
 

@@ -21,16 +21,16 @@ from rig import case as rig_case
 from rig import recipes, sets
 from rig.oracle import Oracle
 
-from mpam_calib.criticism.candidates import HISTORY, candidates
-from mpam_calib.criticism.folds import folds_of
+from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
+from mpam_calib.criticism.fitting.folds import folds_of
 from mpam_calib.criticism.gain import measure_gain
-from mpam_calib.criticism.problem import SIZES, Problem, build_problem
-from mpam_calib.criticism.search import search
-from mpam_calib.criticism.usual_braid import with_strands
+from mpam_calib.criticism.searching.candidates import HISTORY, candidates
+from mpam_calib.criticism.searching.search import search
+from mpam_calib.criticism.searching.usual_braid import with_strands
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Options, draw_blueprint
-from mpam_calib.posterior.pool import settle_worker
+from mpam_calib.posterior.density.pool import settle_worker
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
 

@@ -16,7 +16,7 @@ from rig.muscle import Law, Muscle, free_contraction, static_force
 from rig.protocol import Protocol, Rows, noise_sd, record_rows, sensor_noise
 from rig.specimens import FAMILIES, loops_muscle, sensible, whole_levels
 
-from mpam_calib.criticism.space import model_space
+from mpam_calib.criticism.selection.space import model_space
 from mpam_calib.specimen.declaration import Simulation
 from mpam_calib.specimen.recording import Specimen
 

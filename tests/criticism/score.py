@@ -23,18 +23,18 @@ from rig import case as rig_case
 from rig import margins, recipes, sets
 from rig.effects import form as rig_form
 
-from mpam_calib.criticism.candidates import candidates
+from mpam_calib.criticism.data.problem import build_problem
 from mpam_calib.criticism.diagnose import DRAWS
-from mpam_calib.criticism.problem import build_problem
-from mpam_calib.criticism.search import search
-from mpam_calib.criticism.searched import Search
+from mpam_calib.criticism.searching.candidates import candidates
+from mpam_calib.criticism.searching.search import search
+from mpam_calib.criticism.searching.searched import Search
+from mpam_calib.criticism.searching.usual_braid import with_strands
 from mpam_calib.criticism.sizes import sizes_of
-from mpam_calib.criticism.usual_braid import with_strands
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.effect import effect
-from mpam_calib.posterior.pool import settle_worker
+from mpam_calib.posterior.density.pool import settle_worker
 from mpam_calib.specimen import read
 from mpam_calib.units import si_factor
 

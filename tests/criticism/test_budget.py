@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.budget import beyond_noise, misfit_budget, structured
-from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.problem import SIZES
-from mpam_calib.criticism.searched import Search
-from mpam_calib.criticism.spread import Alone
+from mpam_calib.criticism.budget import misfit_budget, structured
+from mpam_calib.criticism.data.problem import SIZES
+from mpam_calib.criticism.fitting.fit import fit
+from mpam_calib.criticism.fitting.predicted import beyond_noise
+from mpam_calib.criticism.searching.searched import Search
+from mpam_calib.criticism.tasks.spread import Alone
 
 CAUSES = frozenset(["coulomb_friction", "dead_band"])
 CASE = "develop-separable-016"

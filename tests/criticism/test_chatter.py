@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mpam_calib.criticism.chatter import FEWEST, SURE, chatter_rms
-from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.rows import Rows
-from mpam_calib.criticism.search import search
+from mpam_calib.criticism.data.rows import Rows
+from mpam_calib.criticism.fitting.fit import fit
+from mpam_calib.criticism.searching.search import search
+from mpam_calib.criticism.unexplained.chatter import FEWEST, SURE, chatter_rms
 from mpam_calib.criticism.verdict import judge
 
 from .test_hum import FILTERS, noise_of

@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpam_calib.criticism.candidates import candidates
-from mpam_calib.criticism.climb import Climb, _damped
-from mpam_calib.criticism.fit import chain_for
-from mpam_calib.criticism.forms import forms_of
-from mpam_calib.criticism.problem import Problem
+from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.fitting.climb import Climb, _damped
+from mpam_calib.criticism.fitting.fit import chain_for
+from mpam_calib.criticism.fitting.forms import forms_of
+from mpam_calib.criticism.searching.candidates import candidates
 
 from .test_hypotheses import problem_of, specimen_of
 

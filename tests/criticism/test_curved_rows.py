@@ -11,8 +11,8 @@ from rig.muscle import Braid, Geometry, Law, Muscle, Simulation
 from rig.protocol import Protocol
 
 from criticism.test_hypotheses import problem_of
-from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.problem import Problem
+from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.specimen import read
 
 MODULI = (145e3, 4.2e3, 1.3e3)

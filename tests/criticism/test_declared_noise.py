@@ -10,13 +10,13 @@ import pytest
 from prediction.coverage import as_specimen, rig_case
 from rig.chain import force_of
 
-from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.noise_level import noise_level
-from mpam_calib.criticism.noise_windows import inside_strokes
-from mpam_calib.criticism.problem import Problem, build_problem
+from mpam_calib.criticism.data.noise_level import noise_level
+from mpam_calib.criticism.data.noise_windows import inside_strokes
+from mpam_calib.criticism.data.problem import Problem, build_problem
+from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.noise import CORRELATED, TIME, WHITE
-from mpam_calib.posterior.covariance import fast_noise_log_likelihood
+from mpam_calib.posterior.likelihood.covariance import fast_noise_log_likelihood
 from mpam_calib.specimen import read
 from mpam_calib.specimen.declaration import Noise
 from mpam_calib.specimen.recording import ForceMap, Specimen

@@ -11,8 +11,8 @@ from rig import case as rig_case
 from rig import recipes, sets
 
 from mpam_calib.criticism import diagnose as module
-from mpam_calib.criticism.candidates import Candidates, candidates
-from mpam_calib.criticism.problem import Problem
+from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.searching.candidates import Candidates, candidates
 from mpam_calib.run.diagnose import diagnose_to_folder
 from mpam_calib.specimen import read
 

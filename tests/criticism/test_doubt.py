@@ -9,9 +9,9 @@ import pytest
 from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.doubt import DOUBTS
-from mpam_calib.criticism.fit import Fit, Under, by_equations, chain_for, doubt_columns, fit
-from mpam_calib.criticism.problem import Problem
+from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.fitting.doubt import DOUBTS
+from mpam_calib.criticism.fitting.fit import Fit, Under, by_equations, chain_for, doubt_columns, fit
 
 DOUBT = max(DOUBTS)
 CAUSE, SIZE = "length_offset", 0.3

@@ -12,8 +12,11 @@ from rig import sets
 from scipy import special, stats
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism import evidence, ranking, space
-from mpam_calib.criticism.evidence import (
+from mpam_calib.criticism.data.problem import SIZE_PRIOR, SIZES, Problem
+from mpam_calib.criticism.fitting.fit import Fit, fit
+from mpam_calib.criticism.fitting.hypothesis import Hypothesis
+from mpam_calib.criticism.selection import evidence, ranking, space
+from mpam_calib.criticism.selection.evidence import (
     WIDTHS,
     Weighed,
     log_evidence_beyond_laplace,
@@ -21,15 +24,12 @@ from mpam_calib.criticism.evidence import (
     under_other_priors,
     weigh,
 )
-from mpam_calib.criticism.fit import Fit, fit
-from mpam_calib.criticism.hypothesis import Hypothesis
-from mpam_calib.criticism.problem import SIZE_PRIOR, SIZES, Problem
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.moduli import rate_names
-from mpam_calib.posterior.bridge import Bridge
-from mpam_calib.posterior.evidence import integrate
-from mpam_calib.posterior.expansion import expand
-from mpam_calib.posterior.mode import Mode, evaluate
+from mpam_calib.posterior.density.mode import Mode, evaluate
+from mpam_calib.posterior.evidence.bridge import Bridge
+from mpam_calib.posterior.evidence.expansion import expand
+from mpam_calib.posterior.evidence.quadrature import integrate
 from mpam_calib.specimen import read
 from mpam_calib.specimen.declaration import Sensors
 from mpam_calib.specimen.recording import ForceMap
@@ -135,7 +135,7 @@ def test_one_dimension_against_a_dense_grid(problem: Problem) -> None:
 
 def _without_friction(problem: Problem, force: np.ndarray, found: Fit) -> np.ndarray:
     """The forces with the fitted friction taken out of them."""
-    from mpam_calib.criticism.fit import chain_for
+    from mpam_calib.criticism.fitting.fit import chain_for
 
     sign = problem.middle().sign
     prior = chain_for(problem.blueprint.model_dump_json(), frozenset()).parameters[0].prior

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from mpam_calib.criticism.folds import FEW_FOLDS, FOLDS, MANY, folds_of, log_densities, total
+from mpam_calib.criticism.fitting.folds import FEW_FOLDS, FOLDS, MANY, folds_of, log_densities, total
 
 
 @pytest.mark.parametrize("count", [3, 4, 5, 8, MANY - 1, MANY, 15, 31])

@@ -12,10 +12,10 @@ from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
 from criticism.test_sizes import force_with
-from mpam_calib.criticism.fit import Fit, fit
-from mpam_calib.criticism.forms import forms_of, price
-from mpam_calib.criticism.problem import Problem
-from mpam_calib.criticism.refits import (
+from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.fitting.fit import Fit, fit
+from mpam_calib.criticism.fitting.forms import forms_of, price
+from mpam_calib.criticism.fitting.refits import (
     ended,
     in_another_form,
     in_two_other_equations,
@@ -23,7 +23,7 @@ from mpam_calib.criticism.refits import (
     with_better_forms,
     with_doubt,
 )
-from mpam_calib.criticism.spread import held_problem, spread_over
+from mpam_calib.criticism.tasks.spread import held_problem, spread_over
 
 TRUE = frozenset({"creep:early", "presliding"})
 """A level that was held before its first stroke, which a turn began: both act on its first readings."""

@@ -9,13 +9,13 @@ import pytest
 from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.folds import FEWEST
+from mpam_calib.criticism.data.problem import SIZES, Problem
+from mpam_calib.criticism.fitting.fit import fit
+from mpam_calib.criticism.fitting.folds import FEWEST
+from mpam_calib.criticism.fitting.predicted import predict_rows
 from mpam_calib.criticism.gain import Z90, measure_gain
-from mpam_calib.criticism.predicted import predict_rows
-from mpam_calib.criticism.problem import SIZES, Problem
-from mpam_calib.criticism.searched import Search
-from mpam_calib.criticism.spread import Alone
+from mpam_calib.criticism.searching.searched import Search
+from mpam_calib.criticism.tasks.spread import Alone
 
 
 @pytest.fixture(scope="module")

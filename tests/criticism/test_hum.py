@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
-from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.hum import hum_rms
-from mpam_calib.criticism.problem import Problem
-from mpam_calib.criticism.rows import Rows
-from mpam_calib.criticism.search import search
+from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.data.rows import Rows
+from mpam_calib.criticism.fitting.fit import fit
+from mpam_calib.criticism.searching.search import search
+from mpam_calib.criticism.unexplained.hum import hum_rms
 from mpam_calib.criticism.verdict import judge
 
 from .test_hypotheses import problem_of, specimen_of

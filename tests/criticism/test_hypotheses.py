@@ -12,10 +12,10 @@ from rig import case as rig_case
 from rig import recipes, sets
 from scipy import stats
 
-from mpam_calib.criticism.candidates import candidates
-from mpam_calib.criticism.fit import chain_for, fit
-from mpam_calib.criticism.predicted import linearise
-from mpam_calib.criticism.problem import SIZES, Problem, build_problem
+from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
+from mpam_calib.criticism.fitting.fit import chain_for, fit
+from mpam_calib.criticism.fitting.predicted import linearise
+from mpam_calib.criticism.searching.candidates import candidates
 from mpam_calib.model.bend import is_bend
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.chain import Chain

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism import journal as module
-from mpam_calib.criticism.journal import Journal
-from mpam_calib.criticism.search import search
-from mpam_calib.criticism.searched import Search, best_first
-from mpam_calib.criticism.select import Selection, select
-from mpam_calib.posterior.checkpoint import Checkpoint
+from mpam_calib.criticism.searching.search import search
+from mpam_calib.criticism.searching.searched import Search, best_first
+from mpam_calib.criticism.selection.select import Selection, select
+from mpam_calib.criticism.tasks import journal as module
+from mpam_calib.criticism.tasks.journal import Journal
+from mpam_calib.posterior.chains.checkpoint import Checkpoint
 
 
 @dataclass
@@ -127,7 +127,7 @@ def test_a_search_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
 
 def test_a_ranking_comes_back_from_its_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """All that ranking, integrating, bridging, holding out and telling apart return can be kept."""
-    from mpam_calib.criticism import select as selecting
+    from mpam_calib.criticism.selection import select as selecting
 
     specimen = specimen_of("develop-null-001")
     few = [specimen.simulation.model_copy(update={"order": order}) for order in (1, 2)]

@@ -14,11 +14,11 @@ from rig import recipes, sets
 from rig.effects import form as rig_form
 from scipy import integrate, linalg
 
-from mpam_calib.criticism.candidates import candidates
-from mpam_calib.criticism.doubt import DOUBTS
-from mpam_calib.criticism.fit import chain_for, fit
+from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.fitting.doubt import DOUBTS
+from mpam_calib.criticism.fitting.fit import chain_for, fit
 from mpam_calib.criticism.limits import hidden_sizes
-from mpam_calib.criticism.problem import Problem
+from mpam_calib.criticism.searching.candidates import candidates
 from mpam_calib.model.effect import effect
 from mpam_calib.specimen import read
 from mpam_calib.units import si_factor

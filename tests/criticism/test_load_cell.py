@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mpam_calib.criticism.load_cell import FAULT, load_cell_rival
-from mpam_calib.criticism.search import search
-from mpam_calib.criticism.searched import Search
+from mpam_calib.criticism.searching.search import search
+from mpam_calib.criticism.searching.searched import Search
+from mpam_calib.criticism.unexplained.load_cell import FAULT, load_cell_rival
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.model.effect import known_effects
 

@@ -9,7 +9,7 @@ import pytest
 from rig import recipes, sets
 from scipy import signal
 
-from mpam_calib.criticism.noise_windows import between_strokes
+from mpam_calib.criticism.data.noise_windows import between_strokes
 
 from .test_hypotheses import problem_of, specimen_of
 

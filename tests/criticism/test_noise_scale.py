@@ -8,10 +8,10 @@ from model import build
 
 from criticism.test_evidence import loops_of_a_rig
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.fit import Fit, fit
-from mpam_calib.criticism.noise_scale import noise_scale, settle_noise
-from mpam_calib.criticism.problem import SIZES, Problem
-from mpam_calib.criticism.space import model_space
+from mpam_calib.criticism.data.problem import SIZES, Problem
+from mpam_calib.criticism.fitting.fit import Fit, fit
+from mpam_calib.criticism.fitting.noise_scale import noise_scale, settle_noise
+from mpam_calib.criticism.selection.space import model_space
 from mpam_calib.specimen.declaration import Sensors
 from mpam_calib.specimen.recording import ForceMap, Specimen
 

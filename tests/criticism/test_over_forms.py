@@ -10,12 +10,12 @@ from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
 from criticism.test_sizes import force_with
-from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.forms import forms_of
-from mpam_calib.criticism.problem import SIZE_PRIOR, Problem
-from mpam_calib.criticism.refits import causes_of, with_doubt
-from mpam_calib.criticism.searched import CLOSE, Search
-from mpam_calib.criticism.spread import Alone, spread_over
+from mpam_calib.criticism.data.problem import SIZE_PRIOR, Problem
+from mpam_calib.criticism.fitting.fit import fit
+from mpam_calib.criticism.fitting.forms import forms_of
+from mpam_calib.criticism.fitting.refits import causes_of, with_doubt
+from mpam_calib.criticism.searching.searched import CLOSE, Search
+from mpam_calib.criticism.tasks.spread import Alone, spread_over
 
 HIDDEN = {"creep": ("creep_per_decade", 0.1), "force_drift": ("drift_N_per_min", 0.1)}
 """Causes so small that the data hardly tell in which form."""

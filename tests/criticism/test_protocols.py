@@ -19,9 +19,9 @@ from rig import recipes
 from rig.effects import shared_form
 from rig.recipes import Recipe, Wanted
 
-from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.forms import forms_of
-from mpam_calib.criticism.problem import Problem, build_problem
+from mpam_calib.criticism.data.problem import Problem, build_problem
+from mpam_calib.criticism.fitting.fit import fit
+from mpam_calib.criticism.fitting.forms import forms_of
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.specimen import read
 

@@ -11,13 +11,13 @@ from rig import sets
 
 from criticism.own_rates import made_with_rates_of_its_own
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism import ranking
-from mpam_calib.criticism.climb import Climb
-from mpam_calib.criticism.fit import chain_for, fit
-from mpam_calib.criticism.problem import Problem
-from mpam_calib.criticism.rates import Rates, find_rates
-from mpam_calib.criticism.space import model_space
-from mpam_calib.criticism.spread import Alone
+from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.fitting.climb import Climb
+from mpam_calib.criticism.fitting.fit import chain_for, fit
+from mpam_calib.criticism.selection import ranking
+from mpam_calib.criticism.selection.rates import Rates, find_rates
+from mpam_calib.criticism.selection.space import model_space
+from mpam_calib.criticism.tasks.spread import Alone
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.specimen.recording import ForceMap
 

@@ -11,12 +11,12 @@ from rig import sets
 from criticism.own_rates import made_with_rates_of_its_own
 from criticism.test_hypotheses import problem_of, specimen_of
 from criticism.test_rates import SIZE, held_pressures, plain, rates_of
-from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.hypothesis import Hypothesis
-from mpam_calib.criticism.problem import SIZES, Problem
-from mpam_calib.criticism.rates import Rates, find_rates
-from mpam_calib.criticism.rates_alone import RatesAlone, integrate_rates
-from mpam_calib.posterior.evidence import integrate
+from mpam_calib.criticism.data.problem import SIZES, Problem
+from mpam_calib.criticism.fitting.fit import fit
+from mpam_calib.criticism.fitting.hypothesis import Hypothesis
+from mpam_calib.criticism.selection.rates import Rates, find_rates
+from mpam_calib.criticism.selection.rates_alone import RatesAlone, integrate_rates
+from mpam_calib.posterior.evidence.quadrature import integrate
 
 
 @pytest.fixture(scope="module")

@@ -13,10 +13,10 @@ from rig import case as rig_case
 from rig import recipes, sets
 
 from criticism.test_hypotheses import problem_of
-from mpam_calib.criticism import problem as module
-from mpam_calib.criticism import rows
+from mpam_calib.criticism.data import problem as module
+from mpam_calib.criticism.data import rows
 from mpam_calib.model.readings import Readings
-from mpam_calib.posterior.points import Points
+from mpam_calib.posterior.likelihood.points import Points
 from mpam_calib.report.wording import left_aside
 from mpam_calib.specimen import Specimen, read
 

@@ -12,7 +12,7 @@ import pytest
 from rig import sets
 
 from criticism.score import Scored, score_case
-from mpam_calib.posterior.pool import settle_worker
+from mpam_calib.posterior.density.pool import settle_worker
 
 SAMPLE = (
     "develop-null-000",

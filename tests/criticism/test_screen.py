@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mpam_calib.criticism.refits import Set
-from mpam_calib.criticism.screen import gain, promising
+from mpam_calib.criticism.fitting.refits import Set
+from mpam_calib.criticism.searching.screen import gain, promising
 
 Array = NDArray[np.float64]
 Columns = Callable[[Set], Array]

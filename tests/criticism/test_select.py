@@ -13,14 +13,14 @@ from scipy import stats
 from criticism.order_four import draw_case
 from criticism.own_rates import made_with_rates_of_its_own
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism import ranking, space
-from mpam_calib.criticism import select as module
-from mpam_calib.criticism.evidence import Weighed
-from mpam_calib.criticism.fit import Fit, fit
-from mpam_calib.criticism.odds import CHOICES
-from mpam_calib.criticism.ranking import rank
+from mpam_calib.criticism.fitting.fit import Fit, fit
+from mpam_calib.criticism.selection import ranking, space
+from mpam_calib.criticism.selection import select as module
+from mpam_calib.criticism.selection.evidence import Weighed
+from mpam_calib.criticism.selection.odds import CHOICES
+from mpam_calib.criticism.selection.ranking import rank
 from mpam_calib.errors import InputError
-from mpam_calib.posterior.bridge import Bridge
+from mpam_calib.posterior.evidence.bridge import Bridge
 from mpam_calib.report.selection import selection_page
 from mpam_calib.specimen.declaration import Noise, Simulation
 
@@ -55,7 +55,7 @@ def test_held_out_levels_are_predicted_from_the_others() -> None:
     problem = problem_of(specimen_of(recipe.name))
     held = problem.level == problem.level.max()
     index = (np.flatnonzero(~held), np.flatnonzero(held))
-    from mpam_calib.criticism.predicted import predict_rows
+    from mpam_calib.criticism.fitting.predicted import predict_rows
 
     fitted = fit(problem.take(~held), frozenset(), 0)
     mean, covariance = predict_rows(problem, fitted, index)
@@ -131,8 +131,8 @@ def test_the_fourth_order_is_found_in_ninety_of_a_hundred(capsys: pytest.Capture
 def test_a_law_with_rates_of_its_own_is_climbed() -> None:
     """Loops made with such a law: no climb from random starts finds a better mode than the ranking's own.
 
-    Climbs end where the next round promises little (:mod:`mpam_calib.criticism.fit`): along the ridge of the
-    rates, where they started decides tenths of a nat.
+    Climbs end where the next round promises little (:mod:`mpam_calib.criticism.fitting.fit`): along the ridge
+    of the rates, where they started decides tenths of a nat.
     """
     specimen = made_with_rates_of_its_own()
     problem = problem_of(specimen)

@@ -9,12 +9,12 @@ import pytest
 from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.fit import Fit, Under, chain_for, fit
-from mpam_calib.criticism.forms import forms_of, price
-from mpam_calib.criticism.problem import Problem
-from mpam_calib.criticism.searched import Search
+from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.fitting.fit import Fit, Under, chain_for, fit
+from mpam_calib.criticism.fitting.forms import forms_of, price
+from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.sizes import EXCLUDED, Sizes, sizes_of
-from mpam_calib.criticism.spread import Alone
+from mpam_calib.criticism.tasks.spread import Alone
 from mpam_calib.model.effect import effect
 
 CAUSE, SIZE_NAME = "creep", "creep_per_decade"

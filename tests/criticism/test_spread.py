@@ -11,9 +11,9 @@ from rig import sets
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism import spread as module
-from mpam_calib.criticism.refits import best_of
-from mpam_calib.criticism.spread import Alone, held_problem, spread_over
+from mpam_calib.criticism.fitting.refits import best_of
+from mpam_calib.criticism.tasks import spread as module
+from mpam_calib.criticism.tasks.spread import Alone, held_problem, spread_over
 from mpam_calib.errors import Interrupted
 
 

@@ -11,13 +11,13 @@ from model import build
 from rig.muscle import static_force
 from rig.specimens import FAMILIES, loops_muscle
 
-from mpam_calib.criticism.candidates import candidates
-from mpam_calib.criticism.problem import Problem, build_problem
-from mpam_calib.criticism.search import search
-from mpam_calib.criticism.static_noise import static_noise
+from mpam_calib.criticism.data.problem import Problem, build_problem
+from mpam_calib.criticism.data.static_noise import static_noise
+from mpam_calib.criticism.searching.candidates import candidates
+from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.verdict import Verdict, judge
 from mpam_calib.model.blueprint import Options, draw_blueprint
-from mpam_calib.posterior.points import gather_points
+from mpam_calib.posterior.likelihood.points import gather_points
 from mpam_calib.specimen.declaration import Geometry, Sensors
 from mpam_calib.specimen.recording import ForceMap, Specimen
 

@@ -10,15 +10,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from mpam_calib.criticism import structure
-from mpam_calib.criticism.bursts import bursts_rms
-from mpam_calib.criticism.candidates import candidates
-from mpam_calib.criticism.converter import coarse_step
-from mpam_calib.criticism.fit import Fit, fit
-from mpam_calib.criticism.problem import Problem
-from mpam_calib.criticism.repeat import raw_residual, repeating_rms
-from mpam_calib.criticism.saturation import along_a_ceiling, saturated
-from mpam_calib.criticism.structure import structure_tests
+from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.data.saturation import along_a_ceiling, saturated
+from mpam_calib.criticism.fitting.fit import Fit, fit
+from mpam_calib.criticism.searching.candidates import candidates
+from mpam_calib.criticism.unexplained import structure
+from mpam_calib.criticism.unexplained.bursts import bursts_rms
+from mpam_calib.criticism.unexplained.converter import coarse_step
+from mpam_calib.criticism.unexplained.repeat import raw_residual, repeating_rms
+from mpam_calib.criticism.unexplained.structure import structure_tests
 from mpam_calib.model.readings import Readings
 from mpam_calib.specimen import Specimen
 from mpam_calib.specimen.recording import BlockedForce

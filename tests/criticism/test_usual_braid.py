@@ -13,9 +13,9 @@ from rig.muscle import Braid, Geometry, Law, Muscle, Simulation
 from rig.protocol import Protocol
 
 from mpam_calib.criticism import diagnose as module
-from mpam_calib.criticism.candidates import Candidates, candidates
-from mpam_calib.criticism.problem import Problem
-from mpam_calib.criticism.usual_braid import usual_braid
+from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.searching.candidates import Candidates, candidates
+from mpam_calib.criticism.searching.usual_braid import usual_braid
 from mpam_calib.run.diagnose import diagnose_to_folder
 from mpam_calib.specimen import read
 

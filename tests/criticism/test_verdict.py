@@ -11,10 +11,10 @@ from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism import verdict as verdict_module
-from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.problem import SIZES, Problem
-from mpam_calib.criticism.searched import Search
-from mpam_calib.criticism.spread import Alone
+from mpam_calib.criticism.data.problem import SIZES, Problem
+from mpam_calib.criticism.fitting.fit import fit
+from mpam_calib.criticism.searching.searched import Search
+from mpam_calib.criticism.tasks.spread import Alone
 from mpam_calib.criticism.verdict import LISTED, Verdict, judge
 
 CAUSE = frozenset(["length_offset"])

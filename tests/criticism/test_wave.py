@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
-from mpam_calib.criticism.fit import fit
-from mpam_calib.criticism.rows import Rows
-from mpam_calib.criticism.search import search
+from mpam_calib.criticism.data.rows import Rows
+from mpam_calib.criticism.fitting.fit import fit
+from mpam_calib.criticism.searching.search import search
+from mpam_calib.criticism.unexplained.wave import wave_rms
 from mpam_calib.criticism.verdict import judge
-from mpam_calib.criticism.wave import wave_rms
 
 from .test_hum import FILTERS, noise_of
 from .test_hypotheses import problem_of, specimen_of

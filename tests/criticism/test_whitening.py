@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import linalg, sparse
 
-from mpam_calib.criticism.whitening import Axes, Whitening
+from mpam_calib.criticism.data.whitening import Axes, Whitening
 
 
 @pytest.mark.parametrize("ties", [0, 2])

@@ -11,15 +11,15 @@ from threadpoolctl import threadpool_limits
 
 from criticism.test_evidence import dense, inside
 from criticism.test_hypotheses import problem_of
-from mpam_calib.criticism import ranking, space
-from mpam_calib.criticism.evidence import FEW, NEGLIGIBLE, SETTLES, log_evidence_beyond_laplace
-from mpam_calib.criticism.hypothesis import Hypothesis
-from mpam_calib.criticism.problem import SIZE_PRIOR
-from mpam_calib.criticism.ranking import Ranked
-from mpam_calib.criticism.spread import held_problem, spread_over
-from mpam_calib.posterior import refitted
-from mpam_calib.posterior.evidence import integrate
-from mpam_calib.posterior.refitted import integrate_refitted
+from mpam_calib.criticism.data.problem import SIZE_PRIOR
+from mpam_calib.criticism.fitting.hypothesis import Hypothesis
+from mpam_calib.criticism.selection import ranking, space
+from mpam_calib.criticism.selection.evidence import FEW, NEGLIGIBLE, SETTLES, log_evidence_beyond_laplace
+from mpam_calib.criticism.selection.ranking import Ranked
+from mpam_calib.criticism.tasks.spread import held_problem, spread_over
+from mpam_calib.posterior.evidence import refitted
+from mpam_calib.posterior.evidence.quadrature import integrate
+from mpam_calib.posterior.evidence.refitted import integrate_refitted
 from mpam_calib.specimen import read
 
 DATASETS = Path(__file__).parents[2] / "datasets"

@@ -213,7 +213,7 @@ def test_folds_share_the_blueprint():
     made = build.with_force(made, np.full(72, 10.0))
     whole = draw_blueprint(made)
     fold = build.take_levels(made, [0, 2])
-    from mpam_calib.posterior.target import build_target
+    from mpam_calib.posterior.density.target import build_target
 
     full, part = build_target(made, whole), build_target(fold, whole)
     assert full.model.names == part.model.names

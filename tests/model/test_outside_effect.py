@@ -15,7 +15,7 @@ from mpam_calib.model import effect as registry
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.effect import Effect, Stage, effect, known_effects, register
 from mpam_calib.model.priors import Normal, Parameter
-from mpam_calib.posterior.target import build_target, locate, predict_force
+from mpam_calib.posterior.density.target import build_target, locate, predict_force
 from mpam_calib.specimen import effect_ids, read
 
 from . import build

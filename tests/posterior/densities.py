@@ -8,7 +8,7 @@ import numpy as np
 from scipy import special, stats
 
 from mpam_calib.model.priors import HalfNormal
-from mpam_calib.posterior.mode import Mode, climb, curvature
+from mpam_calib.posterior.density.mode import Mode, climb, curvature
 
 Array = np.ndarray
 

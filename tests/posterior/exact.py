@@ -12,7 +12,7 @@ from model import build
 from scipy import stats
 
 from mpam_calib.model.blueprint import Blueprint, draw_blueprint
-from mpam_calib.posterior.target import build_target, predict_force
+from mpam_calib.posterior.density.target import build_target, predict_force
 from mpam_calib.specimen.recording import Specimen
 
 from .reference import Twin

@@ -8,9 +8,9 @@ import numpy as np
 from model import build
 
 from mpam_calib.model.blueprint import Options, draw_blueprint
-from mpam_calib.posterior.collapsed import Collapsed
-from mpam_calib.posterior.mode import Mode
-from mpam_calib.posterior.target import build_target, locate, predict_force
+from mpam_calib.posterior.density.collapsed import Collapsed
+from mpam_calib.posterior.density.mode import Mode
+from mpam_calib.posterior.density.target import build_target, locate, predict_force
 from mpam_calib.specimen.declaration import Noise
 from mpam_calib.specimen.recording import Specimen
 

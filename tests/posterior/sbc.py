@@ -17,10 +17,10 @@ from threadpoolctl import threadpool_limits
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.noise import CORRELATED
 from mpam_calib.model.readings import Readings
-from mpam_calib.posterior.collapsed import Collapsed
+from mpam_calib.posterior.chains.sampling import sample
+from mpam_calib.posterior.density.collapsed import Collapsed
+from mpam_calib.posterior.density.target import build_target, locate, predict_force
 from mpam_calib.posterior.draws import Draws, reported
-from mpam_calib.posterior.sampling import sample
-from mpam_calib.posterior.target import build_target, locate, predict_force
 from mpam_calib.specimen.recording import Specimen
 
 Array = np.ndarray

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from mpam_calib.posterior.adaptive import ENOUGH, MOST_ROUNDS, error_of, weigh_adaptively
+from mpam_calib.posterior.evidence.adaptive import ENOUGH, MOST_ROUNDS, error_of, weigh_adaptively
 
 from .densities import Curved, Gaussian, Sheets, Skewed, dimensions_of, mode_of
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpam_calib.posterior.algebra import cholesky, inverse, solve
-from mpam_calib.posterior.covariance import scatter_log_likelihood
-from mpam_calib.posterior.piece import segment_piece
-from mpam_calib.posterior.sites import chunk_log_likelihood
+from mpam_calib.posterior.density.piece import segment_piece
+from mpam_calib.posterior.likelihood.algebra import cholesky, inverse, solve
+from mpam_calib.posterior.likelihood.covariance import scatter_log_likelihood
+from mpam_calib.posterior.likelihood.sites import chunk_log_likelihood
 
 M = 3
 FAULTY = np.full((M, M), 1e20)

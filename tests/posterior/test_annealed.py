@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from mpam_calib.posterior.annealed import anneal
-from mpam_calib.posterior.mode import Mode
+from mpam_calib.posterior.density.mode import Mode
+from mpam_calib.posterior.evidence.annealed import anneal
 
 from .densities import Gaussian, Sheets, Skewed, mode_of
 

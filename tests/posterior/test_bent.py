@@ -8,11 +8,11 @@ import pytest
 from model import build
 from scipy import stats
 
-from mpam_calib.posterior.mode import evaluate
-from mpam_calib.posterior.proposal import StudentMixture
-from mpam_calib.posterior.sampling import sample
-from mpam_calib.posterior.target import build_target, locate
-from mpam_calib.posterior.weighing import CHECKED, LIGHT, heaviness
+from mpam_calib.posterior.chains.proposal import StudentMixture
+from mpam_calib.posterior.chains.sampling import sample
+from mpam_calib.posterior.chains.weighing import CHECKED, LIGHT, heaviness
+from mpam_calib.posterior.density.mode import evaluate
+from mpam_calib.posterior.density.target import build_target, locate
 
 from . import sbc
 

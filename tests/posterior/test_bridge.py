@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpam_calib.posterior.bridge import Bridge, bridge, bridge_evidence, fitted, independence_chain
-from mpam_calib.posterior.evidence import Evidence, integrate
-from mpam_calib.posterior.mode import evaluate
-from mpam_calib.posterior.proposal import StudentMixture
+from mpam_calib.posterior.chains.proposal import StudentMixture
+from mpam_calib.posterior.density.mode import evaluate
+from mpam_calib.posterior.evidence.bridge import Bridge, bridge, bridge_evidence, fitted, independence_chain
+from mpam_calib.posterior.evidence.quadrature import Evidence, integrate
 
 from .densities import KNOWN, Gaussian, dimensions_of, mode_of
 

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from mpam_calib.posterior.convergence import RHAT_LIMIT, diagnose_chains
+from mpam_calib.posterior.chains.convergence import RHAT_LIMIT, diagnose_chains
 
 SHAPE = (4, 1500, 16)
 

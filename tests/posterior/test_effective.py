@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from emcee.autocorr import integrated_time
 
-from mpam_calib.posterior.effective import autocorrelation_time, ess_bulk, ess_tail, rhat
+from mpam_calib.posterior.chains.effective import autocorrelation_time, ess_bulk, ess_tail, rhat
 
 
 def series(rho: float, shape: tuple[int, int], repeated: bool) -> np.ndarray:

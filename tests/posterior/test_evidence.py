@@ -10,10 +10,10 @@ from model import build
 from scipy import special
 
 from mpam_calib.model.blueprint import Blueprint, Options, draw_blueprint
-from mpam_calib.posterior.collapsed import Collapsed
-from mpam_calib.posterior.evidence import integrate
-from mpam_calib.posterior.mode import Mode, evaluate
-from mpam_calib.posterior.target import build_target, locate, predict_force
+from mpam_calib.posterior.density.collapsed import Collapsed
+from mpam_calib.posterior.density.mode import Mode, evaluate
+from mpam_calib.posterior.density.target import build_target, locate, predict_force
+from mpam_calib.posterior.evidence.quadrature import integrate
 from mpam_calib.specimen.recording import Specimen
 
 from .densities import KNOWN, Curved, Sheet, dimensions_of, mode_of

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mpam_calib.calibration import Calibration, calibrate
+from mpam_calib.posterior.chains.sampling import sample
+from mpam_calib.posterior.density.target import build_target, locate
 from mpam_calib.posterior.draws import Draws, reported
-from mpam_calib.posterior.sampling import sample
-from mpam_calib.posterior.target import build_target, locate
 
 from .exact import NAMES, Exact, exact_posterior, failures, small_specimen
 

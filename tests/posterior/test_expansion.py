@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import special
 
-from mpam_calib.posterior.expansion import TAME, expand
-from mpam_calib.posterior.mode import Mode
+from mpam_calib.posterior.density.mode import Mode
+from mpam_calib.posterior.evidence.expansion import TAME, expand
 
 from .densities import KNOWN, Bounded, Curved, Sheet, Skewed, dimensions_of, mode_of
 

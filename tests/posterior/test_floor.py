@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from model import build
 
-from mpam_calib.posterior.floor import lifted_by_noise, pulling
-from mpam_calib.posterior.points import gather_points
+from mpam_calib.posterior.likelihood.floor import lifted_by_noise, pulling
+from mpam_calib.posterior.likelihood.points import gather_points
 from mpam_calib.specimen.declaration import Sensors
 from mpam_calib.specimen.recording import BlockedForce, ForceMap
 

@@ -10,8 +10,8 @@ from model import build
 from scipy import stats
 
 from mpam_calib.model.blueprint import draw_blueprint
-from mpam_calib.posterior.points import floor_of, gather_points
-from mpam_calib.posterior.target import build_target
+from mpam_calib.posterior.density.target import build_target
+from mpam_calib.posterior.likelihood.points import floor_of, gather_points
 from mpam_calib.specimen.declaration import Sensors
 from mpam_calib.specimen.recording import BlockedForce, ForceMap, FreeContraction
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from mpam_calib.posterior.hills import hills
-from mpam_calib.posterior.mode import Mode, climb, curvature
-from mpam_calib.posterior.refitted import integrate_refitted
+from mpam_calib.posterior.density.hills import hills
+from mpam_calib.posterior.density.mode import Mode, climb, curvature
+from mpam_calib.posterior.evidence.refitted import integrate_refitted
 
 from .densities import KNOWN, dimensions_of, mode_of
 

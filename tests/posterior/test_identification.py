@@ -7,7 +7,7 @@ import pytest
 from model import build
 
 from mpam_calib.model.blueprint import draw_blueprint
-from mpam_calib.posterior.target import build_target, locate, predict_force
+from mpam_calib.posterior.density.target import build_target, locate, predict_force
 
 DEAD_BAND = 8e3
 STRAINS = {"law": "linear", "order": 3, "effects": ("dead_band",)}

@@ -9,11 +9,11 @@ import pytest
 from model import build
 
 from mpam_calib.model.blueprint import Options, draw_blueprint
-from mpam_calib.posterior.bins import bin_loops
-from mpam_calib.posterior.covariance import StrokeCovariance, fast_noise_log_likelihood
-from mpam_calib.posterior.markov import factor, whiten
-from mpam_calib.posterior.scatter import Scatter
-from mpam_calib.posterior.target import build_target
+from mpam_calib.posterior.density.target import build_target
+from mpam_calib.posterior.likelihood.bins import bin_loops
+from mpam_calib.posterior.likelihood.covariance import StrokeCovariance, fast_noise_log_likelihood
+from mpam_calib.posterior.likelihood.markov import factor, whiten
+from mpam_calib.posterior.likelihood.scatter import Scatter
 
 from .reference import Twin
 

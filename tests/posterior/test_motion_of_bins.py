@@ -10,8 +10,8 @@ from model import build
 
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.readings import FAR, TIMES
-from mpam_calib.posterior.bins import bin_loops
-from mpam_calib.posterior.row_motion import row_readings
+from mpam_calib.posterior.likelihood.bins import bin_loops
+from mpam_calib.posterior.likelihood.row_motion import row_readings
 from mpam_calib.specimen.recording import Loops
 
 STROKE, HALF = 0.012, 6.0

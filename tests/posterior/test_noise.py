@@ -11,9 +11,9 @@ from scipy import special, stats
 
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.noise import FREEDOM, GROWTH, WHITE
-from mpam_calib.posterior.collapsed import Guide
-from mpam_calib.posterior.sites import FreeRows, Sites, chunk_log_likelihood, usual_chunks
-from mpam_calib.posterior.target import build_target, locate, predict_force
+from mpam_calib.posterior.density.collapsed import Guide
+from mpam_calib.posterior.density.target import build_target, locate, predict_force
+from mpam_calib.posterior.likelihood.sites import FreeRows, Sites, chunk_log_likelihood, usual_chunks
 from mpam_calib.specimen.declaration import Noise
 from mpam_calib.specimen.recording import BlockedForce, Specimen
 

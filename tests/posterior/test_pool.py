@@ -12,8 +12,8 @@ from model import build
 from threadpoolctl import threadpool_limits
 
 from mpam_calib.model.blueprint import draw_blueprint
-from mpam_calib.posterior.sampling import sample
-from mpam_calib.posterior.target import build_target, locate
+from mpam_calib.posterior.chains.sampling import sample
+from mpam_calib.posterior.density.target import build_target, locate
 
 
 def chain(seed: int) -> np.ndarray:
@@ -35,7 +35,7 @@ def test_a_worker_that_may_have_no_workers_draws_the_same():
 HALF_SENT = """
 import gc, os, struct, time
 from multiprocessing.queues import SimpleQueue
-from mpam_calib.posterior.pool import workers
+from mpam_calib.posterior.density.pool import workers
 
 def half(begun):
     for queue in [each for each in gc.get_objects() if isinstance(each, SimpleQueue)]:

@@ -8,7 +8,7 @@ from emcee import EnsembleSampler, State
 from emcee.moves import MHMove
 from scipy import integrate, stats
 
-from mpam_calib.posterior.proposal import FREEDOM, StudentMixture, fit_normals, independence_move
+from mpam_calib.posterior.chains.proposal import FREEDOM, StudentMixture, fit_normals, independence_move
 
 MEANS = [np.array([0.0, 1.0]), np.array([3.0, -1.0])]
 SPREADS = [np.array([[1.0, 0.6], [0.6, 2.0]]), np.array([[0.3, -0.1], [-0.1, 0.5]])]

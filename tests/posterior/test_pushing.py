@@ -9,7 +9,7 @@ import pytest
 from model import build
 
 from mpam_calib.model.blueprint import draw_blueprint
-from mpam_calib.posterior.target import build_target, locate
+from mpam_calib.posterior.density.target import build_target, locate
 from mpam_calib.specimen.declaration import Sensors
 
 from . import sbc

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpam_calib.posterior.refitted import integrate_refitted
+from mpam_calib.posterior.evidence.refitted import integrate_refitted
 
 from .densities import KNOWN, Curved, dimensions_of, mode_of
 

@@ -7,7 +7,7 @@ import pytest
 from model import build
 
 from mpam_calib.model.blueprint import Options
-from mpam_calib.posterior.target import build_target, locate
+from mpam_calib.posterior.density.target import build_target, locate
 
 from . import sbc
 

@@ -12,9 +12,9 @@ from scipy import integrate, stats
 
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.readings import Readings
-from mpam_calib.posterior.bins import bin_loops
-from mpam_calib.posterior.slack import Slack, with_slack
-from mpam_calib.posterior.target import build_target
+from mpam_calib.posterior.density.slack import Slack, with_slack
+from mpam_calib.posterior.density.target import build_target
+from mpam_calib.posterior.likelihood.bins import bin_loops
 from mpam_calib.specimen.declaration import Sensors
 from mpam_calib.specimen.recording import ForceMap
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from mpam_calib.errors import InputError
-from mpam_calib.posterior.collapsed import Collapsed
-from mpam_calib.posterior.ensembles import start_states
-from mpam_calib.posterior.proposal import StudentMixture
+from mpam_calib.posterior.chains.ensembles import start_states
+from mpam_calib.posterior.chains.proposal import StudentMixture
+from mpam_calib.posterior.density.collapsed import Collapsed
 
 MIXTURE = StudentMixture.build([np.zeros(2)], [np.eye(2)])
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from mpam_calib.posterior.effective import effective_share
-from mpam_calib.posterior.mode import Mode
-from mpam_calib.posterior.proposal import StudentMixture
-from mpam_calib.posterior.rounds import Rounds
-from mpam_calib.posterior.weighing import GOOD_SHARE, LOOKING, refit, weigh
+from mpam_calib.posterior.chains.effective import effective_share
+from mpam_calib.posterior.chains.proposal import StudentMixture
+from mpam_calib.posterior.chains.rounds import Rounds
+from mpam_calib.posterior.chains.weighing import GOOD_SHARE, LOOKING, refit, weigh
+from mpam_calib.posterior.density.mode import Mode
 
 from .test_proposal import bent, log_bent
 

@@ -15,12 +15,12 @@ from rig.specimens import FAMILIES, loops_muscle, sensible, whole_levels
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.model import Model
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.chains.proposal import StudentMixture
+from mpam_calib.posterior.chains.sampling import sample
+from mpam_calib.posterior.chains.weighing import laplace_mixture
+from mpam_calib.posterior.density.mode import evaluate
+from mpam_calib.posterior.density.target import build_target, locate, predict_force
 from mpam_calib.posterior.draws import Draws, keep_draws
-from mpam_calib.posterior.mode import evaluate
-from mpam_calib.posterior.proposal import StudentMixture
-from mpam_calib.posterior.sampling import sample
-from mpam_calib.posterior.target import build_target, locate, predict_force
-from mpam_calib.posterior.weighing import laplace_mixture
 from mpam_calib.specimen.declaration import Braid, Geometry, Sensors
 from mpam_calib.specimen.recording import Loops, Specimen
 

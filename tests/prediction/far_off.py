@@ -15,7 +15,7 @@ from rig.calibration import hyperelastic_muscle, write_calibration_case
 
 from mpam_calib.model.blueprint import Options
 from mpam_calib.model.readings import Readings
-from mpam_calib.posterior.target import predict_force
+from mpam_calib.posterior.density.target import predict_force
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
 

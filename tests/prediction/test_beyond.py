@@ -17,8 +17,8 @@ from mpam_calib.design.draws import MuscleDraws
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.density.target import predict_force
 from mpam_calib.posterior.draws import Draws
-from mpam_calib.posterior.target import predict_force
 from mpam_calib.prediction.bands import muscle_bands
 from mpam_calib.prediction.beyond import Beyond
 from mpam_calib.prediction.curves import force_curves

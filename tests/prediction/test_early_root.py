@@ -11,9 +11,9 @@ from model import build
 
 from mpam_calib.calibration import Calibration, calibrate
 from mpam_calib.model.blueprint import draw_blueprint
+from mpam_calib.posterior.density.target import build_target
 from mpam_calib.posterior.draws import Draws, keep_draws
 from mpam_calib.posterior.early_root import early_roots, without_early_roots
-from mpam_calib.posterior.target import build_target
 from mpam_calib.prediction.curves import contraction_grid, first_root, force_curves
 from mpam_calib.specimen.recording import BlockedForce, FreeContraction, Specimen
 

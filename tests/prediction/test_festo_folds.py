@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.noise import WHITE
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.chains.sampling import sample
+from mpam_calib.posterior.density.target import build_target, locate, predict_force
 from mpam_calib.posterior.draws import keep_draws
-from mpam_calib.posterior.sampling import sample
-from mpam_calib.posterior.target import build_target, locate, predict_force
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
 

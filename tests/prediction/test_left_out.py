@@ -11,7 +11,7 @@ from rig.muscle import static_force
 
 from mpam_calib.calibration import Calibration, calibrate
 from mpam_calib.model.blueprint import Options
-from mpam_calib.posterior.target import predict_force
+from mpam_calib.posterior.density.target import predict_force
 from mpam_calib.prediction.left_out import (
     COLUMNS,
     levels_left_out,

@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 from criticism.test_hypotheses import specimen_of
 
-from mpam_calib.criticism.held_out import LEVEL_COLUMNS
-from mpam_calib.criticism.odds import odds
-from mpam_calib.criticism.select import COLUMNS, Selection
+from mpam_calib.criticism.selection.held_out import LEVEL_COLUMNS
+from mpam_calib.criticism.selection.odds import odds
+from mpam_calib.criticism.selection.select import COLUMNS, Selection
 from mpam_calib.report.choices import choice_sentences
 from mpam_calib.report.page import DataTable, Notice, Page, Text, Verdict
 from mpam_calib.report.selection import evidence_text, ranking_table, selection_page

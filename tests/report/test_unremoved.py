@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mpam_calib.criticism.load_cell import FAULT
+from mpam_calib.criticism.unexplained.load_cell import FAULT
 from mpam_calib.model.effect import effect
 from mpam_calib.report.unremoved import CELL_FAULTS, unremoved
 

@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpam_calib.criticism.held_out import LEVEL_COLUMNS
+from mpam_calib.criticism.selection.held_out import LEVEL_COLUMNS
 from mpam_calib.errors import Interrupted
-from mpam_calib.posterior.bridge import Bridge
-from mpam_calib.posterior.checkpoint import Checkpoint, pack, sweep, unpack, write_atomically
-from mpam_calib.posterior.ensembles import Block, EnsembleState
-from mpam_calib.posterior.mode import Mode
-from mpam_calib.posterior.proposal import StudentMixture
+from mpam_calib.posterior.chains.checkpoint import Checkpoint, pack, sweep, unpack, write_atomically
+from mpam_calib.posterior.chains.ensembles import Block, EnsembleState
+from mpam_calib.posterior.chains.proposal import StudentMixture
+from mpam_calib.posterior.density.mode import Mode
+from mpam_calib.posterior.evidence.bridge import Bridge
 from mpam_calib.specimen.declaration import Simulation
 
 
@@ -156,7 +156,7 @@ def test_a_pickle_is_never_run(checkpoint: Checkpoint, tmp_path: Path) -> None:
 def test_only_values_of_this_package_are_built(
     name: str, checkpoint: Checkpoint, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from mpam_calib.posterior import checkpoint as module
+    from mpam_calib.posterior.chains import checkpoint as module
 
     forged = {"class": name, "fields": {}}
     monkeypatch.setattr(module, "_encode", lambda part, store: forged)

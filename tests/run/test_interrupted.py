@@ -109,7 +109,7 @@ def test_a_run_killed_at_any_moment_is_resumed(
 
 LATE = """
 import multiprocessing, time
-from mpam_calib.posterior.pool import settle_worker
+from mpam_calib.posterior.density.pool import settle_worker
 
 def work():
     time.sleep(1.0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mpam_calib.errors import InputError
-from mpam_calib.posterior.sampling import Listener, Progress
+from mpam_calib.posterior.chains.sampling import Listener, Progress
 from mpam_calib.run.kept import Kept
 from mpam_calib.run.replaced import page_owner, tell_replaced
 

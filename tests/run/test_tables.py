@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 from mpam_calib.model.blueprint import Options, draw_blueprint
-from mpam_calib.posterior.mode import evaluate
-from mpam_calib.posterior.target import build_target, locate
+from mpam_calib.posterior.density.mode import evaluate
+from mpam_calib.posterior.density.target import build_target, locate
 from mpam_calib.specimen import read
 
 from .command import Here

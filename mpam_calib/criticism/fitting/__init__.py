@@ -1,0 +1,1 @@
+"""One hypothesis, refitted exactly: its forms, the doubt about these, its evidence."""

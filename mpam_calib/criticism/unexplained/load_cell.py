@@ -1,0 +1,80 @@
+"""A load cell at fault, as a rival of the causes that lead.
+
+Near the end of its range its readings lack more and more of large forces, as if the fixture gave, the wall
+were thinner or an order of the moduli missing: causes that a search names where it has no other word for it.
+With a zero or a gain of its own at every level it passes for a crosshead zeroed anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations, product
+from math import log
+
+import numpy as np
+
+from mpam_calib.criticism.data.problem import SIZE_PRIOR, SIZES
+from mpam_calib.criticism.fitting.refits import Set, Try, best_of, ended
+from mpam_calib.criticism.searching.searched import Search
+from mpam_calib.model.effect import effect
+
+FAULT = "load_cell"
+ZEROED, RESCALED, CROSSHEAD_ZEROED = "load_cell:zeroed", "load_cell:rescaled", "length_offset:rezeroed"
+"""A zero or a gain for each level, tried where the leading set has a zero of the crosshead's."""
+KNEES = (0.3, 0.6, 0.85)
+"""Shares of the largest reading at which a load cell begins to give way where climbs begin."""
+FAR = 3.0
+"""Prior sds within which these are kept."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """The best set with a load cell's ``fault``: nats by which it leads the leading set, causes beside it."""
+
+    lead: float
+    beside: Set
+    fault: str = FAULT
+
+
+NO_RIVAL = Rival(-np.inf, frozenset())
+
+
+def load_cell_rival(found: Search, leading: Set) -> Rival:
+    """A fault alone, or in place of some of the leading set's causes: at least as plain as that set."""
+    chosen = found.fits[leading, found.best_size(leading)].effects
+    faults = (FAULT, ZEROED, RESCALED) if CROSSHEAD_ZEROED in chosen else (FAULT,)
+    return max((_rival(found, leading, fault) for fault in faults), key=lambda rival: rival.lead)
+
+
+def _rival(found: Search, leading: Set, fault: str) -> Rival:
+    most = max(len(leading) - 1, 0)
+    sets = [frozenset(c) for k in range(most + 1) for c in combinations(sorted(leading), k)]
+    keys = list(product(sets, sorted({0, found.best_size(leading)})))
+    fits = found.spread(best_of, [(size, _tries(found, s, size, fault), found.doubting) for s, size in keys])
+    terms: dict[Set, list[float]] = {}
+    for (beside, size), fitted in zip(keys, fits, strict=True):
+        if fitted is not None:
+            terms.setdefault(beside, []).append(fitted.log_evidence + log(SIZE_PRIOR[size]))
+    scores = {s: float(np.logaddexp.reduce(t)) + found.log_prior(s | {FAULT}) for s, t in terms.items()}
+    if not scores:
+        return NO_RIVAL
+    best = max(scores, key=lambda s: scores[s])
+    return Rival(scores[best] - found.score_of_best(leading), best, fault)
+
+
+def _tries(found: Search, beside: Set, size: int, fault: str) -> list[Try]:
+    """Climbs from where the causes beside it ended: for a cell that gives way, from several knees."""
+    sizes = (size, *range(len(SIZES)))
+    known = next((found.fits[beside, s] for s in sizes if (beside, s) in found.fits), None)
+    forms, start = (
+        (tuple(sorted(beside)), {}) if known is None else (tuple(sorted(known.effects)), ended(known))
+    )
+    if fault != FAULT:
+        return [((*forms, fault), start)]
+    setting = found.problem.model.setting
+    assert setting is not None
+    knee = next(p for p in effect(FAULT).parameters(setting) if p.name == "cell_knee_N")
+    low, high = knee.prior.from_normal(np.array([-FAR, FAR]))
+    places = np.clip(np.array(KNEES) * np.max(found.problem.force), low, high)
+    starts = knee.prior.to_normal(places).tolist()
+    return [((*forms, fault), start | {knee.name: u, "cell_loss_N": 1.0}) for u in starts]
