@@ -214,3 +214,43 @@ def test_what_was_found_of_the_test_no_new_muscle_has() -> None:
         assert len(known) == len(effects)
         forces.append(MuscleDraws.prepare(made, point(made, **known), 50, 0).blocked_forces(P, X))
     assert forces[1] == pytest.approx(forces[0], rel=1e-12)
+
+
+def test_a_design_s_row_is_that_of_its_draws_in_laboratory_units() -> None:
+    force, contraction = np.linspace(70.0, 80.0, 101), np.linspace(0.2, 0.4, 101) ** 2
+    x = np.array([2.5e-3, 0.6e-3, np.radians(70.0), 0.12e-3, 48.0])
+    one = Design("I", 2e5, "q05", x, force, force, contraction, ())
+    two = Design("II", 3e5, "posterior_mean", x[:3], force[::-1], force, contraction, ())
+    table = designs_table([two, one])
+    assert table["case"].tolist() == ["I", "II"]
+    row = table.iloc[0]
+    geometry = ["pressure_kPa", "R_mm", "t_mm", "alpha_deg", "R_br_mm", "n"]
+    assert row[geometry].tolist() == pytest.approx([200.0, 2.5, 0.6, 70.0, 0.12, 48.0])
+    assert row[["blocked_force_N", "q05", "q50", "q95"]].tolist() == pytest.approx([75.0, 70.5, 75.0, 79.5])
+    ends = [contraction.mean(), 0.21**2, 0.39**2]
+    assert row[["free_contraction", "fc_q05", "fc_q95"]].tolist() == pytest.approx(ends)
+    assert table[["R_br_mm", "n"]].iloc[1].isna().all()
+
+
+def test_what_holds_a_design_back_is_said_in_short() -> None:
+    x, draws = X, np.array([0.3, 0.6, 0.6, 0.4])
+    held = ("R at its upper bound", "α at its upper bound", "t at its lower bound", "V_bl/V >= low")
+    found = Design("II", P, "q05", x, draws, draws, draws, held)
+    assert found.held == "R, α at upper; t at lower; V_bl/V >= low"
+    assert found.without_root == 0.5
+    assert Design("II", P, "q05", x, draws, draws, draws, ()).held == "nothing"
+
+
+def test_packed_strands_cost_what_their_energy_takes() -> None:
+    """Of strands up to 0.13 mm a hundred fit round the muscle; of thicker ones 30, as many as it takes."""
+    made = model()
+    free, thin, thick = 2.5 * MM, 0.13 * MM, 2.0 * np.pi * R * np.sin(ALPHA) / 30.0
+    found = Optimiser(made, point(made), 0).packed(P, (0.13 * MM, 2.5 * MM))
+
+    def loss(radius: float, n: float) -> float:
+        return 4.0 * np.pi * P**2 * R**4 * np.sin(ALPHA) / (2.1e9 * n * radius**2 * np.cos(ALPHA) ** 4)
+
+    assert F_BEST - found.free == pytest.approx(loss(free, 100.0), rel=0.01)
+    losses = [F_BEST - force for force in found.force]
+    assert losses == pytest.approx([loss(thin, 100.0), loss(thick, 30.0)], rel=0.01)
+    assert [x[4] for x in found.x] == [100.0, 30.0]
