@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from rig import sets
 from scipy import stats
@@ -17,7 +18,7 @@ from mpam_calib.criticism.fitting.fit import Fit, fit
 from mpam_calib.criticism.selection import ranking, space
 from mpam_calib.criticism.selection import select as module
 from mpam_calib.criticism.selection.evidence import Weighed
-from mpam_calib.criticism.selection.odds import CHOICES
+from mpam_calib.criticism.selection.odds import CHOICES, declared_or_beside, odds
 from mpam_calib.criticism.selection.ranking import rank
 from mpam_calib.errors import InputError
 from mpam_calib.posterior.evidence.bridge import Bridge
@@ -223,6 +224,27 @@ def test_what_an_effect_adds_is_not_there_twice() -> None:
         assert len({m.model_dump_json() for m in models}) == len(models)
 
 
+def test_odds_of_a_choice_sum_over_all_else() -> None:
+    declared = Simulation(order=2, law="linear", friction="none")
+    told = [(2, "linear", -10.0, 0.5), (2, "constant", -11.0, 0.2), (3, "linear", -12.0, 0.2)]
+    told += [(3, "constant", -13.0, 0.1)]
+    beside = {name: getattr(declared, name) for name in ("friction", "kinematics", "strain")}
+    models = pd.DataFrame(
+        [beside | {"order": o, "law": law, "log_evidence": e, "probability": p} for o, law, e, p in told]
+    )
+    found = odds(models, declared).set_index(["choice", "value"])
+    assert found.loc[[("order", 2), ("order", 3)], "probability"].tolist() == pytest.approx([0.7, 0.3])
+    assert found.loc[("law", "constant"), "probability"] == pytest.approx(0.3)
+    assert found.loc[("order", 2), "log_evidence"] == pytest.approx(np.log(np.exp(-10.0) + np.exp(-11.0)))
+    # With this one choice made so, all else as declared.
+    alone = found["log_evidence_declared"]
+    assert (alone["order", 2], alone["order", 3], alone["law", "constant"]) == (-10.0, -12.0, -11.0)
+    missing = odds(models[models["law"] == "constant"], declared).set_index(["choice", "value"])
+    assert np.isnan(missing.loc[("order", 3), "log_evidence_declared"])
+    changed = [declared.model_copy(update=u) for u in ({}, {"order": 3}, {"order": 3, "law": "constant"})]
+    assert [declared_or_beside(simulation, declared) for simulation in changed] == [True, True, False]
+
+
 @pytest.mark.long
 def test_without_replicates_there_is_no_confusion(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """And the page has its statement on orders, laws and levels all the same."""
@@ -233,10 +255,10 @@ def test_without_replicates_there_is_no_confusion(monkeypatch: pytest.MonkeyPatc
     specimen = replace(specimen_of(recipe.name), noise=Noise(robust=True))
     found = module.select(specimen, replicates=0, workers=1)
     assert np.isnan(found.confusion).all()
-    odds = found.odds.set_index(["choice", "value"])
+    told = found.odds.set_index(["choice", "value"])
     by_hand = found.models.groupby("law")["probability"].sum()
     for law, share in by_hand.items():
-        assert odds.loc[("law", law), "probability"] == pytest.approx(share)
+        assert told.loc[("law", law), "probability"] == pytest.approx(share)
     assert set(found.levels["model"]) == {"first", "held out", "declared"}
     assert len(found.levels) == 3 * len(specimen.levels_Pa)
     # The model is true: levels are predicted as well as the bands say.
