@@ -106,6 +106,12 @@ def test_curves_without_a_root_are_marked_where_they_are_more_than_a_few() -> No
 
 
 def test_pressures_more_than_a_hundredth_of_the_highest_outside_the_levels_are_extrapolated() -> None:
+    model, draws = known()
+    found = muscle_bands(model, draws.thin(50), np.array([2e5, 2.1e5]), 0)
+    assert found[found["pressure_kPa"] > 205.0]["extrapolated"].all()
+    assert (
+        not found[found["pressure_kPa"] < 205.0].set_index("quantity").loc["free_contraction", "extrapolated"]
+    )
     reach = Reach(LEVELS, np.array([0.2, 0.25, 0.3]), np.zeros(3))
     asked = np.array([0.97e5, 0.99e5, 1.5e5, 2.01e5, 2.03e5])
     assert reach.outside(asked).tolist() == [True, False, False, False, True]

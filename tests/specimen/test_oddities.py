@@ -225,3 +225,66 @@ def test_a_thick_wall_contracts_further_than_a_thin_one(
     if asked:
         said = re.search(r"braid's limit of (\S+)", " ".join(found))
         assert said is not None and float(said[1]) == pytest.approx(limit, abs=1.5e-3)
+
+
+@pytest.mark.parametrize("said", [True, False], ids=["within a level", "between two"])
+def test_a_pause_within_a_level_is_said(said: bool, tmp_path: Path) -> None:
+    row = 20 if said else int(np.argmax(loops().pressure > 50.0))
+
+    def pause(rows: list[list[str]]) -> None:
+        for cells in rows[row:]:
+            cells[0] = f"{float(cells[0]) + 5.0:.8g}"
+
+    found = remarks(tmp_path, pause)
+    words = "loops: a gap in the time of file 1 within a level, the longest 5.1 s after 1.9 s"
+    assert (words in found, "a gap" in found) == (said, said)
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.03, False), (0.08, True)])
+def test_a_pressure_that_wanders_is_said_to(share: float, said: bool, tmp_path: Path) -> None:
+    def ripple(rows: list[list[str]]) -> None:
+        for i, cells in enumerate(rows):
+            cells[1] = f"{float(cells[1]) * (1.0 + share * np.sin(0.9 * i)):.8g}"
+
+    wanders = re.findall(r"loops: (\S+) kPa wanders by (\S+) kPa", remarks(tmp_path, ripple))
+    assert len(wanders) == (3 if said else 0)
+    for level, by in wanders:
+        assert float(by) == pytest.approx(share * float(level), rel=0.15)
+
+
+def test_a_level_that_goes_one_way_alone_is_said_to(tmp_path: Path) -> None:
+    made = loops()
+    kept = (made.branch == -1) | (made.pressure != 100.0)
+    header, *body = made.text().splitlines()
+    text = "\n".join([header, *(line for line, keep in zip(body, kept, strict=True) if keep)]) + "\n"
+    found = " ".join(oddities(read(make(tmp_path, loops=text))))
+    assert re.findall(r"loops: (\S+) kPa has only the branch (\w+)", found) == [("100", "unloading")]
+
+
+def test_rows_without_a_branch_are_counted(tmp_path: Path) -> None:
+    made, words = loops(), {1: "loading", -1: "unloading"}
+    header, *body = made.text().splitlines()
+    named = [words[int(b)] if i >= 4 else "" for i, b in enumerate(made.branch)]
+    text = "\n".join([f"{header},branch", *map(",".join, zip(body, named, strict=True))]) + "\n"
+    found = " ".join(oddities(read(make(tmp_path, loops=text))))
+    assert re.findall(r"loops: (\S+) kPa has (\d+) rows without a branch", found) == [("50", "4")]
+
+
+def test_slack_rows_are_counted(tmp_path: Path) -> None:
+    text = DECLARATION.replace("[files]", "[sensors]\nforce_floor_N = 12.0\n[files]")
+    made = loops()
+    found = " ".join(oddities(read(make(tmp_path, text, loops=made.text()))))
+    count = int(np.sum(made.force <= 12.0))
+    assert f"loops: {count} of {len(made.force)} rows are slack" in found
+    assert "slack" not in remarks(tmp_path / "none")
+
+
+def test_rows_longer_than_the_straight_strands_are_counted(tmp_path: Path) -> None:
+    """1 - 1/sin 72° = -0.0515."""
+    text = DECLARATION.replace('loops = "loops.csv"', 'force_map = "force_map.csv"')
+    text = text.replace('law = "linear"', 'law = "constant"')
+    rows = "".join(f"200,{c},{50.0 - 100.0 * c}\n" for c in (-0.06, -0.052, -0.05, 0.0, 0.1, 0.2, 0.3))
+    found = " ".join(
+        oddities(read(make(tmp_path, text, force_map="pressure_kPa,contraction,force_N\n" + rows)))
+    )
+    assert "force_map: 2 rows are longer than the straight strands (contraction -0.051)" in found

@@ -248,7 +248,7 @@ def test_without_data_only_where_asked(tmp_path: Path) -> None:
     declaration = (DECLARATION + 'moduli = "tensile"\nE_Pa = [4.0e4]\n').replace('loops = "loops.csv"', "")
     folder = make(tmp_path, declaration)
     assert not read(folder, data_required=False).has_muscle_data
-    with pytest.raises(Exception, match="no data files"):
+    with pytest.raises(InputError, match="no data files"):
         read(folder)
 
 

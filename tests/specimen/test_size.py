@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mpam_calib.errors import InputError
 from mpam_calib.specimen import read, reduction
 from mpam_calib.specimen.summary import summarise_loops
 
@@ -114,7 +115,7 @@ def test_small_blocks_report_the_right_row(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr("mpam_calib.specimen.blocks.BLOCK_BYTES", 1000)
     lines = noisy().text().splitlines()
     lines[2345] = "1,2,x,4"
-    with pytest.raises(Exception, match=r"loops.csv:2346:displacement_mm: "):
+    with pytest.raises(InputError, match=r"loops.csv:2346:displacement_mm: "):
         read(make(tmp_path, loops="\n".join(lines)))
 
 
