@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from criticism.test_hypotheses import problem_of, specimen_of
-from mpam_calib.criticism.budget import misfit_budget, structured
+from mpam_calib.criticism.budget import misfit_budget, remainder_rms, structured
 from mpam_calib.criticism.data.problem import SIZES
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.fitting.predicted import beyond_noise
@@ -93,3 +93,25 @@ def test_a_crosshead_that_rests_leaves_the_budget_as_it_is(found: Search) -> Non
     assert budget.before == pytest.approx(moving.before, rel=0.1)
     assert budget.after == pytest.approx(moving.after, abs=0.1 * moving.before)
     assert budget.shares == pytest.approx(moving.shares, abs=0.1)
+
+
+def test_newtons_are_root_mean_squares_of_what_the_equations_leave(found: Search) -> None:
+    """Before and after beyond the noise, which is a reading's."""
+    budget, problem = misfit_budget(found, CAUSES), found.problem
+    for effects, told in ((frozenset[str](), budget.before), (CAUSES, budget.after)):
+        forms = found.best_fit(CAUSES).effects if effects else effects
+        left = problem.force - fit(problem, forms, 0).force
+        square = float(np.mean(left**2) - np.mean(np.diagonal(problem.noise)))
+        assert told == pytest.approx(np.sqrt(max(square, 0.0)), abs=0.02 * budget.before)
+    assert budget.noise == problem.noise_level.total
+
+
+def test_the_remainder_is_what_smoothing_the_misfit_leaves_of_it(found: Search) -> None:
+    """A wave that no cause makes comes out with its root mean square; without a remainder there is none."""
+    problem = found.problem
+    way = problem.middle().displacement
+    wave = 8.0 * problem.noise_level.total * np.cos(5.0 * np.pi * way / way.max())
+    fitted = fit(problem, CAUSES, len(SIZES) - 1)
+    moved = replace(problem, force=fitted.force + fitted.doubt + wave)
+    assert remainder_rms(moved, fitted) == pytest.approx(np.sqrt(np.mean(wave**2)), rel=0.05)
+    assert remainder_rms(moved, replace(fitted, size=0)) == 0.0

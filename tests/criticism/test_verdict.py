@@ -15,6 +15,7 @@ from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.tasks.spread import Alone
+from mpam_calib.criticism.unexplained.load_cell import FAULT, NO_RIVAL, Rival
 from mpam_calib.criticism.verdict import LISTED, Verdict, judge
 
 CAUSE = frozenset(["length_offset"])
@@ -160,3 +161,88 @@ def test_a_further_cause_that_the_data_do_not_exclude_is_listed(
     verdict = judge(found)
     assert verdict.word == "named"
     assert ((CAUSE | {"creep"}) in verdict.others()) == listed
+
+
+def behind_by(found: Search, effects: frozenset[str], gap: float) -> None:
+    """Move the evidence of a set's fits until the first of all sets leads it by ``gap`` nats."""
+    first = max(found.score(s) for s in found.sets if s != effects)
+    change = first - gap - found.score(effects)
+    for key, fitted in list(found.fits.items()):
+        if key[0] == effects:
+            found.fits[key] = replace(fitted, log_evidence=fitted.log_evidence + change)
+
+
+@pytest.fixture
+def no_rival(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(verdict_module, "load_cell_rival", lambda found, leading: NO_RIVAL)
+
+
+@pytest.mark.usefixtures("no_rival")
+@pytest.mark.parametrize(("lead", "word"), [(2.0, "adequate"), (4.0, "ambiguous"), (6.0, "named")])
+def test_a_cause_is_named_only_where_it_leads_clearly(problem: Problem, lead: float, word: str) -> None:
+    """Odds of 7 do not exclude nothing at all; odds of 55 do, but its lead is short of five nats."""
+    found = search_where_the_cause_leaves(problem, 0.1)
+    behind_by(found, NOTHING, lead)
+    verdict = judge(found)
+    assert verdict.word == word
+    assert verdict.leading == verdict.standing == (NOTHING if word == "adequate" else CAUSE)
+    expected = 1.0 / (1.0 + np.exp(-lead))
+    assert verdict.probabilities[CAUSE] == pytest.approx(expected)
+
+
+@pytest.mark.usefixtures("no_rival")
+@pytest.mark.parametrize(("rivals", "word"), [(10, "named"), (20, "ambiguous")])
+def test_nor_is_it_where_many_others_together_are_not_improbable(
+    problem: Problem, rivals: int, word: str
+) -> None:
+    """Each 5.5 nats behind: ten are a thirtieth beside the first, twenty a twelfth."""
+    found = search_where_the_cause_leaves(problem, 0.1)
+    names = [f"effect_{i}" for i in range(rivals)]
+    found.tested = (*CAUSE, *names)
+    for other in (frozenset({name}) | (CAUSE if i % 2 else NOTHING) for i, name in enumerate(names)):
+        found.fits[other, 0] = found.fits[CAUSE, 0]
+        behind_by(found, other, 5.5)
+    verdict = judge(found)
+    assert verdict.word == word
+    share = np.exp(-5.5) / (1.0 + rivals * np.exp(-5.5))
+    # Half of the others have the cause in them as well.
+    assert verdict.marginals["length_offset"] == pytest.approx(1.0 - rivals / 2 * share, abs=1e-9)
+
+
+@pytest.mark.usefixtures("no_rival")
+@pytest.mark.parametrize(("gap", "hidden"), [(5.0, True), (25.0, False)])
+def test_an_adequate_simulation_is_told_with_its_own_remainder_and_what_could_hide(
+    problem: Problem, gap: float, hidden: bool
+) -> None:
+    """A set is behind by its prior odds, too: by seven nats here."""
+    plain = problem.with_force(problem.force - 3.0 * problem.noise_level.total)
+    found = Search(plain, tuple(CAUSE), Alone(plain))
+    nothing = [fit(plain, NOTHING, size) for size in range(2)]
+    best = max(fitted.log_evidence for fitted in nothing)
+    found.fits[NOTHING, 0], cause = nothing[0], fit(plain, CAUSE, 0)
+    found.fits[NOTHING, 1] = replace(nothing[1], log_evidence=best + 4.0)
+    found.fits[CAUSE, 0] = cause
+    behind_by(found, CAUSE, gap)
+    verdict = judge(found)
+    assert (verdict.word, verdict.leading, verdict.size) == ("adequate", NOTHING, 1)
+    assert verdict.unseen == ({CAUSE} if hidden else set())
+
+
+@pytest.mark.parametrize(
+    ("rival", "word", "standing"),
+    [
+        (Rival(-6.0, NOTHING), "named", CAUSE),
+        (Rival(-4.0, CAUSE), "unexplained", CAUSE),
+        (Rival(3.0, NOTHING), "unexplained", NOTHING),
+    ],
+)
+def test_a_load_cell_that_comes_near_takes_the_name_and_what_it_replaces(
+    problem: Problem, monkeypatch: pytest.MonkeyPatch, rival: Rival, word: str, standing: frozenset[str]
+) -> None:
+    found = search_where_the_cause_leaves(problem, 0.1)
+    monkeypatch.setattr(verdict_module, "load_cell_rival", lambda found, leading: rival)
+    monkeypatch.setattr(verdict_module, "_standing", lambda found, leading: leading)
+    verdict = judge(found)
+    assert (verdict.word, verdict.standing) == (word, standing)
+    told = (None, "") if word == "named" else (rival.lead, FAULT)
+    assert (verdict.load_cell, verdict.cell_fault) == told
