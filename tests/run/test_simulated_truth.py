@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy import stats
 
-from mpam_calib.prediction.simulate import Simulated, simulate
+from mpam_calib.prediction.simulate import Simulated, _noise, simulate
 from mpam_calib.specimen import read
 
 from .command import Here
@@ -141,3 +142,25 @@ def test_what_lies_below_the_floor_is_not_shown(tmp_path: Path) -> None:
     specimen = read(Specimen().write(tmp_path / "own", loops=loops_text(rows=60)))
     high = replace(specimen, sensors=specimen.sensors.model_copy(update={"force_floor_N": 1e3}))
     assert simulate(high, {"dead_band": 5.0}).not_shown == ("dead_band",)
+
+
+def test_noise_that_is_put_in_is_white_lasts_grows_and_has_tails_as_declared() -> None:
+    force = np.repeat([0.0, 50.0], 40_000)
+
+    def made(dt: float | None = 0.1, **values: float) -> Array:
+        known = {name: np.full((1, 1), value) for name, value in values.items()}
+        return _noise(force, dt, known, 25.0, np.random.default_rng(0))
+
+    both = {"noise_sd_N": 0.3, "noise_corr_sd_N": 0.4, "noise_corr_time_s": 0.2}
+    noise = made(**both)
+    assert noise.std() == pytest.approx(0.5, rel=0.02)
+    # Of the whole, what lasts is 0.16/0.25 and falls by e^(−dt/τ) with every reading.
+    for lag in (1, 3):
+        correlation = np.corrcoef(noise[lag:], noise[:-lag])[0, 1]
+        assert correlation == pytest.approx(0.64 * np.exp(-0.5 * lag), abs=0.02)
+    assert made(None, **both).std() == pytest.approx(0.3, rel=0.02)
+    # At twice the force scale and a growth of one: √5 times the noise.
+    grown = made(noise_sd_N=0.3, noise_growth=1.0)
+    assert [part.std() for part in np.split(grown, 2)] == pytest.approx([0.3, 0.3 * np.sqrt(5.0)], rel=0.02)
+    tailed = made(noise_sd_N=0.3, noise_dof=3.0)
+    assert stats.kstest(tailed / 0.3, stats.t(3.0).cdf).pvalue > 1e-3

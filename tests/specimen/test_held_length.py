@@ -73,7 +73,9 @@ def test_words_that_are_given_do(tmp_path: Path) -> None:
     made = ramps((0.0, 5.0, 10.0))
     words = np.tile(np.repeat(["pressurising", "depressurising"], 80), 3)
     rows = [f"{row},{word}" for row, word in zip(made.text().splitlines()[1:], words, strict=True)]
-    read(make(tmp_path, loops="\n".join([f"{HEADER},branch", *rows]) + "\n"))
+    found = read(make(tmp_path, loops="\n".join([f"{HEADER},branch", *rows]) + "\n")).loops
+    assert found is not None
+    assert found.branch.tolist() == np.where(words == "pressurising", 2, -2).tolist()
 
 
 def filled(start: float, end: float, rows: int, wait: int) -> Array:
