@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mpam_calib.model.chain import Chain
+from mpam_calib.model.friction import DeclaredFriction
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.readings import Readings
 from mpam_calib.specimen.declaration import Geometry
@@ -64,3 +66,19 @@ def test_strands_rub_finitely_where_tips_take_the_whole_length(simulation: dict[
     made = model(**{**simulation, "effects": effects, "geometry": short})
     found = friction(made, stroke=0.012, f_s=0.3, tip_factor=2.0)
     assert np.all(np.isfinite(found)) and np.all(found > 0.0)
+
+
+def test_friction_of_each_level_is_its_own_and_between_them_interpolated() -> None:
+    """At a level by its number, whatever the gauge reads there; beyond all of them the outer one's."""
+    setting = model(friction="coulomb", friction_by_pressure=True).setting
+    assert setting is not None
+    friction = DeclaredFriction(setting)
+    assert friction.names == ["K_f@100", "K_f@150", "K_f@200"]
+    pressure = 1e3 * np.array([104.0, 104.0, 175.0, 50.0, 260.0])
+    plain = Readings.at_rest(pressure, np.full(5, 0.004), np.ones(5))
+    state = Chain(setting, None, False).start(
+        replace(plain, level=np.array([0, -1, -1, -1, -1])), np.zeros(1)
+    )
+    values = dict(zip(friction.names, (np.full((1, 1), K) for K in (0.1, 0.2, 0.4)), strict=True))
+    found = friction.apply(state, values).coulomb
+    np.testing.assert_allclose(found, [[0.1, 0.108, 0.3, 0.1, 0.4]])
