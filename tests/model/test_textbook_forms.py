@@ -302,3 +302,90 @@ def test_a_load_cell_s_zero_and_gain_are_each_level_s_and_else_the_mean() -> Non
     gains = {f"cell_gain_{i + 1}": 0.01 * part for i, part in enumerate(parts)}
     found = applied("load_cell:rescaled", state, setting, **gains).gain
     np.testing.assert_allclose(np.ravel(found), [1.01, 0.98, 1.03, 1.06, 1.02])
+
+
+@pytest.mark.parametrize(
+    ("form", "own", "part"),
+    [
+        ("", {}, lambda x, level, v: x),
+        (":power", {"droop_exponent": 1.5}, lambda x, level, v: np.sign(x) * np.abs(x) ** 1.5),
+        (":level", {}, lambda x, level, v: x / level),
+        (":level-power", {"droop_exponent": 2.0}, lambda x, level, v: np.sign(x) * (x / level) ** 2),
+        (":speed", {"flow_exponent": 0.5}, lambda x, level, v: x * np.sqrt(v)),
+    ],
+)
+def test_a_supply_loses_along_the_stroke(form: str, own: dict[str, float], part: Any) -> None:
+    """Shares of the longest stroke, or of what the level's own is of it; speeds over the test's mean."""
+    setting = setting_for("pressure_droop")
+    state = shaped(setting)
+    after = applied(f"pressure_droop{form}", state, setting, droop_percent=0.08, **own)
+    x, v = np.ravel(state.displacement) / setting.stroke, state.readings.pace / SPEED
+    level = np.interp(state.readings.pressure, setting.levels, np.linspace(0.6, 1.0, len(LEVELS)))
+    lost = np.ravel(1.0 - after.pressure / state.pressure)
+    np.testing.assert_allclose(lost, 0.08 * part(x, level, v), rtol=1e-9, atol=1e-15)
+
+
+def test_strands_may_store_and_rub_by_another_power_of_the_pressure() -> None:
+    setting = setting_for("braid_stretch:power")
+    state = shaped(setting)
+    plain = applied("braid_stretch", state, setting, braid_factor=1.3).lost
+    lost = applied("braid_stretch:power", state, setting, braid_factor=1.3, braid_exponent=1.4).lost
+    np.testing.assert_allclose(lost / plain, (state.pressure / MIDDLE) ** (1.4 - 2.0), rtol=1e-9)
+    for pressure in setting.levels:
+        own = rubbing("strand_friction:power", 0.5, pressure, f_s=0.3, strand_exponent=1.0)
+        expected = (pressure / MIDDLE) ** (1.0 - 4.0 / 3.0) * rubbing(
+            "strand_friction", 0.5, pressure, f_s=0.3
+        )
+        assert own == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("form", "own", "left"),
+    [
+        ("", {}, lambda y: np.exp(-y)),
+        (":ramp", {}, lambda y: np.maximum(1.0 - y, 0.0)),
+        (":power", {"reversal_exponent": 0.5}, lambda y: 1.0 - np.sqrt(np.minimum(0.5 * y, 1.0))),
+    ],
+)
+def test_friction_turns_over_after_a_reversal(form: str, own: dict[str, float], left: Any) -> None:
+    """From the whole of it against the way to the whole along it, in travel over the reversal's."""
+    setting = setting_for("presliding")
+    state = shaped(setting, replace(rows(setting), reversal=np.ones(60)))
+    reversal = 0.1 * setting.stroke
+    after = applied(f"presliding{form}", state, setting, reversal_mm=reversal, **own)
+    expected = state.readings.sign * (1.0 - 2.0 * left(state.readings.travel / reversal))
+    np.testing.assert_allclose(np.ravel(after.sign), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("form", "built"),
+    [
+        ("", lambda y: 1.0 - 2.0 * np.exp(-y)),
+        (":rest", lambda y: 1.0 - np.exp(-y)),
+        (":masing", lambda y: 1.0 - np.exp(-2.0 * y)),
+        (":sliding", np.ones_like),
+    ],
+)
+def test_friction_of_a_first_stroke_begins_against_it_at_rest_or_along_it(form: str, built: Any) -> None:
+    setting = setting_for("presliding")
+    first = replace(rows(setting), reversal=np.zeros(60), cycle=np.ones(60), test_cycle=np.ones(60))
+    reversal = 0.1 * setting.stroke
+    after = applied(f"presliding{form}", shaped(setting, first), setting, reversal_mm=reversal)
+    np.testing.assert_allclose(np.ravel(after.sign), first.sign * built(first.travel / reversal), atol=1e-9)
+
+
+@pytest.mark.parametrize("force", [False, True])
+@pytest.mark.parametrize("test", [False, True])
+@pytest.mark.parametrize("power", [False, True])
+def test_softening_fades_with_a_level_s_cycles_or_the_test_s(force: bool, test: bool, power: bool) -> None:
+    """Exponentially or by a power of their count, in the bladder's stress or in the whole force."""
+    setting = setting_for("stress_softening")
+    state = shaped(setting)
+    parts = [word for word, there in (("test", test), ("force", force), ("power", power)) if there]
+    own = {"cycle_exponent": 1.5} if power else {}
+    form = ":".join(["stress_softening", *(["-".join(parts)] if parts else [])])
+    after = applied(form, state, setting, first_cycle_fraction=0.2, **own)
+    cycle = state.readings.test_cycle if test else state.readings.cycle
+    gain, other = (after.gain, after.wall_gain) if force else (after.wall_gain, after.gain)
+    np.testing.assert_allclose(np.ravel(gain), 1.0 + 0.2 * (cycle**-1.5 if power else np.exp(1.0 - cycle)))
+    np.testing.assert_array_equal(other, np.ones_like(other))
