@@ -75,6 +75,17 @@ def test_scatter_on_one_way_is_found_with_its_size(rows: Rows, way: float) -> No
     assert chatter_rms(rows, noise + more * there, even(rows)) == 0.0
 
 
+def test_chatter_is_in_newtons_whatever_the_noise_is_measured_in(rows: Rows) -> None:
+    """Strokes compare by what the noise of a reading is there; what one way has more is of the mean one."""
+    chatters = noise_of("white", rows, 7) * np.where(rows.readings.sign > 0.0, 4.0, 1.0)
+    plain = chatter_rms(rows, chatters, even(rows))
+    assert plain == pytest.approx(np.sqrt(15.0), rel=0.1)
+    assert chatter_rms(rows, chatters, 0.2 * even(rows)) == pytest.approx(plain)
+    grows = 1.0 + rows.readings.level
+    found = chatter_rms(rows, chatters * grows, grows)
+    assert found == pytest.approx(plain * np.mean(grows), rel=0.1)
+
+
 def test_nothing_at_all_is_no_error(rows: Rows) -> None:
     none = np.zeros(len(rows.force), dtype=bool)
     nothing = Rows(rows.readings.take(none), rows.force[none], rows.stroke[none], rows.rest[none])

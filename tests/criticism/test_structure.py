@@ -82,6 +82,25 @@ def test_structure_fires_on_what_was_added(
     assert quiet[against].p_value > 1e-4
 
 
+@pytest.mark.parametrize(
+    ("against", "shape"),
+    [
+        ("contraction", lambda r: np.cos(3.0 * np.pi * r.displacement / r.displacement.max())),
+        ("time", lambda r: r.time / r.time.max()),
+        ("cycle", lambda r: 1.0 / r.cycle),
+    ],
+)
+def test_the_size_of_structure_is_that_of_what_was_added(
+    null: tuple[Problem, Fit], against: str, shape: Callable[[object], Array]
+) -> None:
+    """About its mean, which is none; the fit's own parameters could take up little of it."""
+    problem, fitted = null
+    added = 20.0 * problem.noise_level.total * shape(problem.middle())
+    found = structure_tests(replace(problem, force=problem.force + added), fitted)
+    size = next(t.size for t in found if t.against == against)
+    assert size == pytest.approx(np.std(added), rel=0.25)
+
+
 @pytest.mark.parametrize("name", NULLS)
 def test_noise_does_not_repeat(name: str) -> None:
     problem = problem_of(specimen_of(name))
@@ -267,6 +286,16 @@ def test_bursts_stand_out_of_short_and_long_strokes(name: str, one_in: int) -> N
         assert bursts_rms(problem.rows, quiet, sd) == 0.0
         added = float(np.sqrt(np.mean((loud - quiet) ** 2)))
         assert least * added < bursts_rms(problem.rows, loud, sd) < 1.2 * added
+
+
+def test_bursts_are_in_newtons_whatever_the_noise_is_measured_in(null: tuple[Problem, Fit]) -> None:
+    problem, _ = null
+    assert problem.rows is not None
+    quiet, loud = in_bursts(problem, 15.0 * problem.noise_level.total, 1)
+    even = np.ones(len(quiet))
+    found = [bursts_rms(problem.rows, loud, scale * even) for scale in (1.0, 0.1, 5.0)]
+    assert found == pytest.approx([found[0]] * 3)
+    assert 0.3 < found[0] / np.sqrt(np.mean((loud - quiet) ** 2)) < 1.2
 
 
 @pytest.mark.parametrize("name", NULLS)
