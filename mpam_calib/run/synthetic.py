@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -29,8 +30,7 @@ def demand_synthetic_folder(path: Path) -> None:
 def write_specimen(simulated: Simulated, source: Path, folder: Path) -> None:
     """Write specimen.toml (the source's, with new files), the synthetic CSV files and truth.json."""
     document = tomlkit.parse(source.read_text(encoding="utf-8-sig"))
-    identity = document["specimen"]
-    assert isinstance(identity, tomlkit.items.Table)
+    identity: Any = document["specimen"]  # a table in its own lines, or in braces
     name = str(identity["name"])
     identity["name"] = name if name.endswith("(synthetic)") else f"{name} (synthetic)"
     for table in ("files", "columns", "csv"):

@@ -208,6 +208,20 @@ def test_a_synthetic_specimen_finds_the_run_of_its_moduli(
     assert material_of(read(made)) == material_of(read(folder))
 
 
+def test_a_declaration_may_have_its_tables_in_braces(muscle: Path, tmp_path: Path, here: Here) -> None:
+    folder = Path(shutil.copytree(muscle, tmp_path / "braces"))
+    (folder / "specimen.toml").write_text(
+        'specimen = { name = "Small muscle" }\n'
+        "geometry = { L0_mm = 50.0, R0_mm = 3.0, t0_mm = 0.7, alpha0_deg = 72.0 }\n"
+        'files = { loops = "loops.csv" }\n'
+        'simulation = { friction = "coulomb", order = 2, law = "linear" }\n'
+    )
+    assert here("simulate", folder, "-o", tmp_path / "made").code == 0
+    made, own = read(tmp_path / "made"), read(folder)
+    assert made.name == "Small muscle (synthetic)"
+    assert (made.geometry, made.simulation) == (own.geometry, own.simulation)
+
+
 def test_each_synthetic_row_is_one_reading(muscle: Path) -> None:
     """Though the rows that it stands at were averages of a very large file."""
     specimen = read(muscle)
