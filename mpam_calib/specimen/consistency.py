@@ -45,16 +45,20 @@ def normalised_simulation(source: TomlSource, declaration: Declaration) -> Simul
 
 
 def unused(source: TomlSource, declaration: Declaration, used: Simulation) -> tuple[str, ...]:
-    """Remarks on keys of [simulation] that are declared, and that its moduli or its friction overrule."""
+    """Remarks on what is declared and not used: keys that moduli or friction overrule, a tensile test."""
     stated = source.tables.get("simulation", {})
-    by_pressure = used.friction == "none" and used.friction_by_pressure
-    none = ('simulation: friction_by_pressure = true is not used: friction is "none"',) if by_pressure else ()
-    return none + tuple(
+    other: list[str] = []
+    if used.friction == "none" and used.friction_by_pressure:
+        other.append('simulation: friction_by_pressure = true is not used: friction is "none"')
+    if declaration.files.of("tensile") and declaration.files.muscle and used.moduli != "tensile":
+        other.append(f'files: the tensile test is not used: moduli = "{used.moduli}"')
+    overruled = (
         f"simulation: {name} = {json.dumps(getattr(declaration.simulation, name))} is not used: "
         f"the moduli make it {json.dumps(getattr(used, name))}"
         for name in ("order", "law", "strain", "friction")
         if name in stated and getattr(declaration.simulation, name) != getattr(used, name)
     )
+    return (*other, *overruled)
 
 
 def check_parts(source: TomlSource, declaration: Declaration, *, data_required: bool) -> None:

@@ -187,6 +187,18 @@ def test_what_declared_moduli_overrule_is_said(tmp_path: Path, simulation: str, 
     assert ("is not used" in found) == bool(said)
 
 
+@pytest.mark.parametrize(("moduli", "said"), [("loops", True), ("tensile", False)])
+def test_a_tensile_test_that_is_not_used_is_said(moduli: str, said: bool, tmp_path: Path) -> None:
+    """Beside a muscle's readings it counts only where the moduli are said to be its own."""
+    text = DECLARATION.replace("order = 2", f'order = 2\nmoduli = "{moduli}"')
+    folder = make(tmp_path, text.replace("[files]", '[files]\ntensile = "t.csv"'), loops=loops().text())
+    rows = "\n".join(f"{i / 10},{1e4 * i}" for i in range(1, 9))
+    (folder / "t.csv").write_text(f"strain,stress_Pa\n{rows}\n")
+    found = " ".join(oddities(read(folder)))
+    assert ('files: the tensile test is not used: moduli = "loops"' in found) == said
+    assert ("tensile test is not used" in found) == said
+
+
 def turning_point(kinematics: str) -> float:
     """The contraction where gas and wall cancel, of a muscle of 50, 3 and 0.7 mm and 72°, by bisection."""
     low, high = 0.0, 0.6
