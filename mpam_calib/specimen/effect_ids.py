@@ -52,7 +52,7 @@ EFFECT_FORMS: Final[dict[str, tuple[str, ...]]] = {
         *("bent", "force", "force-bent", "test", "test-bent", "test-force", "test-force-bent"),
         *("power", "force-power", "test-power", "test-force-power"),
         *("virgin", "virgin-fading", "force-fading", "fresh", "path", "test-virgin", "test-force-virgin"),
-        *("recovering", "force-recovering", "growing", "force-growing"),
+        *("recovering", "force-recovering", "growing", "force-growing", "worn", "test-worn"),
     ),
     "creep": (
         *("bent", "wall", "wall-bent", "early", "power", "solid", "stretched", "steps"),

@@ -256,6 +256,24 @@ def test_what_is_stretched_anew_is_ogden_and_roxburgh_s() -> None:
     np.testing.assert_allclose((gain - 1.0) / 0.2, expected, atol=0.02)
 
 
+@pytest.mark.parametrize("form", ["worn", "test-worn"])
+@pytest.mark.parametrize(("reach", "power"), [(0.2, 0.5), (0.1, 1.0)])
+def test_it_softens_by_an_exponential_of_the_way_to_the_farthest_so_far(
+    form: str, reach: float, power: float
+) -> None:
+    setting = setting_for(f"stress_softening:{form}")
+    readings = driven(setting)
+    way = np.maximum.accumulate(readings.displacement) - readings.displacement
+    readings = replace(readings, behind=way)
+    setting = replace(setting, strokes=None, stroke=float(readings.displacement.max()))
+    values = {
+        "first_cycle_fraction": one(0.2), "softening_reach": one(reach), "softening_power": one(power),
+    }  # fmt: skip
+    gain = effect(f"stress_softening:{form}").apply(start(setting, readings), values, setting).wall_gain
+    expected = np.exp(-((way / setting.stroke / reach) ** power))
+    np.testing.assert_allclose((np.broadcast_to(gain, (1, len(way)))[0] - 1.0) / 0.2, expected, atol=1e-4)
+
+
 @pytest.mark.parametrize("gap", [0.05, 0.2, 0.6])
 def test_a_bladder_blown_up_to_the_braid_takes_a_thin_tube_s_pressure(gap: float) -> None:
     """Neo-Hookean, held in length: stress μ(λ² − λ⁻²) in a wall of t/λ at the radius λr."""

@@ -23,6 +23,7 @@ Fading = Callable[[Array, Values], Array]
 POWERS = ("power", "force-power", "test-power", "test-force-power")
 REACHING = ("virgin", "fresh", "test-virgin", "test-force-virgin")
 FADING = ("virgin-fading", "force-fading")
+WORN = ("worn", "test-worn")
 GROWING = ("growing", "force-growing")
 RECOVERING = ("recovering", "force-recovering")
 
@@ -43,6 +44,11 @@ def _reach(setting: Setting) -> tuple[Parameter, ...]:
             "softening_reach", LogNormal(0.3, 0.5), "share of the stroke over which it softens", "", ""
         ),
     )
+
+
+def _reach_and_power(setting: Setting) -> tuple[Parameter, ...]:
+    power = Parameter("softening_power", LogNormal(0.8, 0.4), "power of the way in its exponent", "", "")
+    return (*_reach(setting), power)
 
 
 def _reach_and_exponent(setting: Setting) -> tuple[Parameter, ...]:
@@ -96,6 +102,17 @@ def _by_stretch(fading: Fading, over_test: bool = False) -> Share:
         way = state.readings.behind if over_test else _level_way(state, setting)
         near = special.erfc(way / setting.stroke / values["softening_reach"])
         return np.asarray(near * fading(state.readings.cycle, values))
+
+    return share
+
+
+def _worn(over_test: bool) -> Share:
+    """As new where it had never been stretched so far; from there on by a steep exponential of the way."""
+
+    def share(state: State, values: Values, setting: Setting) -> Array:
+        way = state.readings.behind if over_test else _level_way(state, setting)
+        shares = way / setting.stroke / values["softening_reach"]
+        return np.asarray(np.exp(-(shares ** values["softening_power"])))
 
     return share
 
@@ -181,6 +198,8 @@ register(
             "force-fading": _muscle(_by_stretch(_power)),
             "fresh": _bladder(_fresh),
             "path": _bladder(_path),
+            "worn": _bladder(_worn(over_test=False)),
+            "test-worn": _bladder(_worn(over_test=True)),
             "growing": _bladder(_growing),
             "force-growing": _muscle(_growing),
             "recovering": _bladder(_recovering),
@@ -193,6 +212,7 @@ register(
         | dict.fromkeys(FADING, _reach_and_exponent)
         | dict.fromkeys(RECOVERING, _recovery)
         | dict.fromkeys(GROWING, _growth)
+        | dict.fromkeys(WORN, _reach_and_power)
         | {"path": _strokes},
         apart=("virgin-fading", "force-recovering"),
         sources=dict.fromkeys(POWERS, "textbook: power of the cycle count (steep: the first cycle alone)")
@@ -202,6 +222,9 @@ register(
         )
         | dict.fromkeys(RECOVERING, "softening of which a part recovers at rest (Diani et al. 2009)")
         | dict.fromkeys(GROWING, "textbook: the more the farther it is stretched, less with every cycle")
+        | dict.fromkeys(
+            WORN, "e^(−(way/s)ᵖ), with p of a half Beatty & Krishnaswamy 2000, with one an exponential"
+        )
         | {"path": "continuous damage: e^(−way/s) (Miehe 1995, Eur. J. Mech. A 14)"},
         kinds={
             "force": "here the whole muscle, not the bladder alone",
