@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mpam_calib.criticism.unexplained.load_cell import FAULT, RESCALED, ZEROED
+from mpam_calib.criticism.unexplained.load_cell import FAULT, LATE, RESCALED, ZEROED
 from mpam_calib.report.numbers import significant
 
 CELL_FAULTS = {
@@ -16,6 +16,10 @@ CELL_FAULTS = {
     RESCALED: (
         "whose gain differs from level to level",
         "hang one dead weight on it before and after each level, and look at its plug and its range",
+    ),
+    LATE: (
+        "that is read late",
+        "look at its amplifier's filter and at the clocks of force and crosshead, and repeat a level slowly",
     ),
 }
 """What a load cell does that explains the readings, and how to look at it."""

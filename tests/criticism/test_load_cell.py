@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.searching.searched import Search
-from mpam_calib.criticism.unexplained.load_cell import FAULT, load_cell_rival
+from mpam_calib.criticism.unexplained.load_cell import FAULT, LATE, load_cell_rival
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.model.effect import known_effects
 
@@ -108,5 +108,42 @@ def test_a_cell_s_zero_or_gain_at_one_level_is_no_crosshead_s(name: str, zero: b
     assert (verdict.word, verdict.standing) == ("unexplained", frozenset())
 
 
-def test_the_fault_is_no_effect_that_a_specimen_may_declare() -> None:
-    assert FAULT not in known_effects()
+OPENING = ("presliding", "rate_friction", "creep", "pressure_droop")
+"""Causes that open a loop, or that time or the way tells."""
+
+
+@pytest.mark.parametrize(
+    ("name", "delay"),
+    [("develop-null-016", 0.1), pytest.param("develop-null-011", 0.3, marks=pytest.mark.long)],
+)
+def test_a_cell_that_is_read_late_is_no_friction(name: str, delay: float) -> None:
+    """Nothing is hidden, and each force is that of some tenths of a second before."""
+    specimen = specimen_of(name)
+    loops = specimen.loops
+    assert loops is not None
+    late = loops.force_N.copy()
+    for level in np.unique(loops.level):
+        here = loops.level == level
+        late[here] = np.interp(loops.time_s[here] - delay, loops.time_s[here], loops.force_N[here])
+    problem = problem_of(replace(specimen, loops=replace(loops, force_N=late)))
+    verdict = judge(search(problem, OPENING))
+    assert verdict.leading
+    assert (verdict.word, verdict.standing, verdict.cell_fault) == ("unexplained", frozenset(), LATE)
+
+
+@pytest.mark.parametrize(
+    ("name", "truth"),
+    [
+        ("develop-separable-036", {"presliding"}),
+        pytest.param("develop-separable-033", {"rate_friction"}, marks=pytest.mark.long),
+    ],
+)
+def test_what_opens_a_loop_is_no_late_cell(name: str, truth: set[str]) -> None:
+    found = search(problem_of(specimen_of(name)), OPENING)
+    verdict = judge(found)
+    assert (verdict.word, verdict.standing, verdict.load_cell) == ("named", truth, None)
+    assert load_cell_rival(found, verdict.leading).lead < -10.0
+
+
+def test_the_faults_are_no_effects_that_a_specimen_may_declare() -> None:
+    assert not {FAULT, LATE} & set(known_effects())

@@ -252,3 +252,21 @@ def test_over_a_test_only_what_was_never_stretched_is_as_new() -> None:
     again = excess[STEPS:]
     np.testing.assert_allclose(again[whole.displacement < 0.3 * setting.stroke], 0.0, atol=1e-6)
     np.testing.assert_allclose(again[whole.displacement > 0.5 * setting.stroke], 0.3)
+
+
+@pytest.mark.parametrize("delay", [0.3, 1.1])
+def test_a_late_cell_is_read_at_the_place_of_a_moment_before(delay: float) -> None:
+    """On a path that begins at rest: before that it stood still."""
+    setting = setting_for("presliding")
+    readings = driven(setting)
+    delay *= setting.stroke / STEPS / SPEED * 20.0
+    time = np.cumsum(np.abs(np.diff(readings.displacement, prepend=0.0))) / SPEED
+    before = start(setting, readings)
+    after = effect("late_force").apply(before, {"cell_delay_s": one(delay)}, setting)
+    expected = np.interp(time - delay, np.append(0.0, time), np.append(0.0, readings.displacement))
+    # Between the readings on both sides of a turn the way there is longer than their distance.
+    np.testing.assert_allclose(after.displacement[0], expected, atol=2.0 * setting.stroke / STEPS)
+    past = np.interp(time - delay, time, np.arange(len(time)))
+    sure = np.abs(readings.travel / (delay * SPEED) - 1.0) > 0.25
+    assert np.mean(sure) > 0.9
+    np.testing.assert_array_equal(after.sign[0][sure], readings.sign[np.round(past).astype(int)][sure])

@@ -2,7 +2,8 @@
 
 Near the end of its range its readings lack more and more of large forces, as if the fixture gave, the wall
 were thinner or an order of the moduli missing: causes that a search names where it has no other word for it.
-With a zero or a gain of its own at every level it passes for a crosshead zeroed anew.
+With a zero or a gain of its own at every level it passes for a crosshead zeroed anew, and read late for what
+rubs and for what lets go after a turn.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from mpam_calib.model.effect import effect
 FAULT = "load_cell"
 ZEROED, RESCALED, CROSSHEAD_ZEROED = "load_cell:zeroed", "load_cell:rescaled", "length_offset:rezeroed"
 """A zero or a gain for each level, tried where the leading set has a zero of the crosshead's."""
+LATE, BY_DIRECTION = "late_force", {"presliding", "rate_friction", "coulomb_friction", "strand_friction"}
+"""A cell that is read late, tried where the leading set has what opens a loop."""
 KNEES = (0.3, 0.6, 0.85)
 """Shares of the largest reading at which a load cell begins to give way where climbs begin."""
 FAR = 3.0
@@ -42,7 +45,11 @@ NO_RIVAL = Rival(-np.inf, frozenset())
 def load_cell_rival(found: Search, leading: Set) -> Rival:
     """A fault alone, or in place of some of the leading set's causes: at least as plain as that set."""
     chosen = found.fits[leading, found.best_size(leading)].effects
-    faults = (FAULT, ZEROED, RESCALED) if CROSSHEAD_ZEROED in chosen else (FAULT,)
+    faults = [FAULT]
+    if CROSSHEAD_ZEROED in chosen:
+        faults += [ZEROED, RESCALED]
+    if leading & BY_DIRECTION:
+        faults.append(LATE)
     return max((_rival(found, leading, fault) for fault in faults), key=lambda rival: rival.lead)
 
 
@@ -59,7 +66,9 @@ def _rival(found: Search, leading: Set, fault: str) -> Rival:
     if not scores:
         return NO_RIVAL
     best = max(scores, key=lambda s: scores[s])
-    return Rival(scores[best] - found.score_of_best(leading), best, fault)
+    # What opens a loop beside a cell that is read late may be no more than how that is reckoned.
+    beside = best - BY_DIRECTION if fault == LATE else best
+    return Rival(scores[best] - found.score_of_best(leading), beside, fault)
 
 
 def _tries(found: Search, beside: Set, size: int, fault: str) -> list[Try]:
