@@ -270,3 +270,16 @@ def test_a_late_cell_is_read_at_the_place_of_a_moment_before(delay: float) -> No
     sure = np.abs(readings.travel / (delay * SPEED) - 1.0) > 0.25
     assert np.mean(sure) > 0.9
     np.testing.assert_array_equal(after.sign[0][sure], readings.sign[np.round(past).astype(int)][sure])
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 1.0])
+def test_a_late_cell_next_to_a_turn_is_read_no_farther_than_the_stroke_s_pace_takes_it(share: float) -> None:
+    """However rough the speed there: travel of half a micrometre, at a share of the pace."""
+    setting = setting_for("presliding")
+    readings = driven(setting)
+    readings = replace(readings, travel=np.full(len(readings), 5e-7), speed=share * readings.pace)
+    before = start(setting, readings)
+    after = effect("late_force").apply(before, {"cell_delay_s": one(0.3)}, setting)
+    moved = np.abs(after.displacement - before.displacement)
+    assert np.all(moved <= 0.5 * np.pi * SPEED * 0.3 * (1.0 + 1e-9))
+    assert np.all(np.isfinite(after.sign))

@@ -34,8 +34,10 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     # The time since the turn, less the delay, as a share of that time.
     left = 1.0 - values["cell_delay_s"] * rows.speed / (power * travel)
     before = np.where(rows.reversal > 0.0, left, np.maximum(left, 0.0))
+    # Speeds next to a turn are rough: nobody goes farther than a half-wave's fastest in that time.
+    most = 0.5 * np.pi * rows.pace * values["cell_delay_s"]
     # Shortening grows while unloading (sign −1).
-    shift = rows.sign * travel * (1.0 - np.abs(before) ** power)
+    shift = rows.sign * np.clip(travel * (1.0 - np.abs(before) ** power), -most, most)
     past = np.clip(left / BLUR, -1.0, 1.0)
     sign = state.sign * np.where(rows.reversal > 0.0, past, 1.0)
     return state._replace(displacement=state.displacement + shift, sign=sign)
