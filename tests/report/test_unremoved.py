@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mpam_calib.criticism.unexplained.load_cell import FAULT
+from mpam_calib.criticism.unexplained.load_cell import FAULT, LATE
 from mpam_calib.model.effect import effect
 from mpam_calib.report.unremoved import CELL_FAULTS, unremoved
 
@@ -24,6 +24,7 @@ FAULTLESS = {
         ("load_cell", "dead weights up to the blocked force"),
         ("load_cell:zeroed", "with the muscle unhooked"),
         ("load_cell:rescaled", "its plug and its range"),
+        ("late_force", "its amplifier's filter"),
     ],
 )
 @pytest.mark.parametrize(("nats", "by"), [(12.0, "better"), (-2.0, "nearly as well")])
@@ -36,7 +37,7 @@ def test_a_load_cell_at_fault_is_told_with_how_to_look_at_it(
 
 
 def test_every_fault_of_the_load_cell_has_words() -> None:
-    assert set(CELL_FAULTS) == {FAULT, *(f"{FAULT}:{form}" for form in effect(FAULT).forms)}
+    assert set(CELL_FAULTS) == {FAULT, *(f"{FAULT}:{form}" for form in effect(FAULT).forms), LATE}
 
 
 @pytest.mark.parametrize(
