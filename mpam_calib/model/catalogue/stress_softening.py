@@ -99,7 +99,7 @@ def _by_stretch(fading: Fading, over_test: bool = False) -> Share:
     """As new where it had never been stretched so far; from then on the softer, the farther from there."""
 
     def share(state: State, values: Values, setting: Setting) -> Array:
-        way = state.readings.behind if over_test else _level_way(state, setting)
+        way = _way_to_farthest(state, setting, over_test)
         near = special.erfc(way / setting.stroke / values["softening_reach"])
         return np.asarray(near * fading(state.readings.cycle, values))
 
@@ -110,7 +110,7 @@ def _worn(over_test: bool) -> Share:
     """As new where it had never been stretched so far; from there on by a steep exponential of the way."""
 
     def share(state: State, values: Values, setting: Setting) -> Array:
-        way = state.readings.behind if over_test else _level_way(state, setting)
+        way = _way_to_farthest(state, setting, over_test)
         shares = way / setting.stroke / values["softening_reach"]
         return np.asarray(np.exp(-(shares ** values["softening_power"])))
 
@@ -148,6 +148,11 @@ def _strokes(setting: Setting) -> tuple[Parameter, ...]:
     return (
         Parameter("softening_strokes", prior, "longest strokes in whose way it softens", "Miehe 1995", ""),
     )
+
+
+def _way_to_farthest(state: State, setting: Setting, over_test: bool) -> Array:
+    """Way (m) to the farthest stretch so far, of the whole test or of the level alone."""
+    return state.readings.behind if over_test else _level_way(state, setting)
 
 
 def _level_way(state: State, setting: Setting) -> Array:
