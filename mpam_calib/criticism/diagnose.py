@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from mpam_calib.criticism.budget import Budget, misfit_budget
 from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.fitting.refits import Set
@@ -18,18 +16,19 @@ from mpam_calib.criticism.searching.candidates import Candidates, candidates
 from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.searching.searched import LARGEST, Search
 from mpam_calib.criticism.searching.usual_braid import SHAPE_ALONE, need_strands, with_strands
-from mpam_calib.criticism.sizes import Sizes, sizes_of
+from mpam_calib.criticism.sizes import Sizes, Told, sizes_of
 from mpam_calib.criticism.tasks.journal import Journal, journalled
+from mpam_calib.criticism.unexplained.load_cell import Rival
 from mpam_calib.criticism.unexplained.structure import Structure, structure_tests
 from mpam_calib.criticism.verdict import Verdict, judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
 from mpam_calib.model.effect import effect
+from mpam_calib.model.state import Setting
 from mpam_calib.specimen.declaration import Braid
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import si_factor
 
-DRAWS = 4000
 WORKERS = 2
 Tell = Callable[[str, float], None]
 
@@ -156,8 +155,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "trace": None
         if verdict.trace is None
         else {"against": verdict.trace.against, "rms_N": _round(verdict.trace.size)},
-        "load_cell_nats": None if verdict.load_cell is None else _round(verdict.load_cell),
-        "load_cell_fault": verdict.cell_fault,
+        "load_cell": told_of(verdict.load_cell, diagnosis.sizes.setting, seed),
         "searched": {
             "sets": len(diagnosis.search.seen | {effects for effects, _ in diagnosis.search.searched}),
             "largest": LARGEST,
@@ -187,31 +185,35 @@ def _cause(diagnosis: Diagnosis, identifier: str, seed: int) -> dict[str, Any]:
     verdict, sizes = diagnosis.verdict, diagnosis.sizes
     setting = sizes.setting
     written = next(e for e in sizes.fits[0].effects if e.partition(":")[0] == identifier)
-    parameters: dict[str, dict[str, float]] = {}
-    within = False
+    told = sizes.told(written, seed)
     declared = {"braid_angle": setting.geometry.sd.alpha0, "dead_band": setting.pressure_bias_sd}
-    for number, parameter in enumerate(effect(written).parameters(setting)):
-        rng = np.random.default_rng([seed, 9, number])
-        values = sizes.draw(parameter.name, DRAWS, rng)
-        factor = si_factor(parameter.name)
-        q05, q95 = np.quantile(values, [0.05, 0.95]) / factor
-        parameters[parameter.name] = {
-            "mean": _round(float(values.mean()) / factor),
-            "sd": _round(float(values.std(ddof=1)) / factor),
-            "q05": _round(float(q05)),
-            "q95": _round(float(q95)),
-        }
-        if number == 0:  # the size itself; the others shape it
-            within = abs(float(values.mean())) <= 2.0 * declared.get(identifier, 0.0)
+    size = next(iter(told.values()))  # the others shape it
+    within = abs(size.mean) <= 2.0 * declared.get(identifier, 0.0)
     return {
         "id": identifier,
         "form": written.partition(":")[2],
         "forms": [{"form": f, "probability": _round(p)} for f, p in sizes.forms(identifier).items()],
         "probability": _round(verdict.marginals[identifier]),
-        "parameters": parameters,
+        "parameters": _in_lab_units(told),
         "share_of_misfit": _round(diagnosis.budget.shares[identifier]),
         "within_declared_uncertainty": within,
     }
+
+
+def _in_lab_units(told: dict[str, Told]) -> dict[str, dict[str, float]]:
+    """Parameters as they are written."""
+    return {
+        name: {key: _round(x / si_factor(name)) for key, x in of._asdict().items()}
+        for name, of in told.items()
+    }
+
+
+def told_of(cell: Rival | None, setting: Setting, seed: int) -> dict[str, Any] | None:
+    """A load cell at fault, as it is written: its parameters in lab units, and its lead in nats."""
+    if cell is None or cell.fitted is None:
+        return None
+    told = Sizes((cell.fitted,), setting).told(cell.fault, seed)
+    return {"fault": cell.fault, "nats": _round(cell.lead), "parameters": _in_lab_units(told)}
 
 
 def _limit(diagnosis: Diagnosis, identifier: str) -> dict[str, Any]:

@@ -6,6 +6,7 @@ The likeliest form alone would be too sure of a size: that of another may lie a 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,16 @@ Array = NDArray[np.float64]
 
 EXCLUDED = 8.0
 """Nats behind the likeliest form from which on another is left out."""
+DRAWS = 4000
+
+
+class Told(NamedTuple):
+    """What is told of one parameter (SI units): its 90 % band is from ``q05`` to ``q95``."""
+
+    mean: float
+    sd: float
+    q05: float
+    q95: float
 
 
 @dataclass(frozen=True)
@@ -55,6 +66,17 @@ class Sizes:
         counts = rng.multinomial(count, np.array(weights) / sum(weights))
         drawn = [fit.draw(name, n, rng) for fit, n in zip(having, counts, strict=True)]
         return np.concatenate([prior.from_normal(u) for prior, u in zip(priors, drawn, strict=True)])
+
+    def told(self, written: str, seed: int) -> dict[str, Told]:
+        """Each parameter of one of the effects (written with its form), by name."""
+        found = {}
+        for number, parameter in enumerate(effect(written).parameters(self.setting)):
+            values = self.draw(parameter.name, DRAWS, np.random.default_rng([seed, 9, number]))
+            q05, q95 = np.quantile(values, [0.05, 0.95])
+            found[parameter.name] = Told(
+                float(values.mean()), float(values.std(ddof=1)), float(q05), float(q95)
+            )
+        return found
 
 
 def sizes_of(found: Search, effects: Set) -> Sizes:

@@ -14,7 +14,7 @@ from mpam_calib.criticism.fitting.refits import Set
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.unexplained.faults import FAULTLESS, Faults, faults_of
 from mpam_calib.criticism.unexplained.free_strokes import score_beside
-from mpam_calib.criticism.unexplained.load_cell import NO_RIVAL, load_cell_rival
+from mpam_calib.criticism.unexplained.load_cell import NO_RIVAL, Rival, load_cell_rival
 from mpam_calib.criticism.unexplained.structure import Structure, structure_tests
 
 Word = Literal["adequate", "named", "ambiguous", "unexplained"]
@@ -38,10 +38,9 @@ class Verdict:
     """The word, the leading set, and every set with its probability (best first).
 
     ``standing`` are the causes that hold even beside a remainder; ``size`` indexes the remainder's size
-    under the leading set, which leaves the ``faults``; ``load_cell`` is by how many nats a load cell at fault
-    (``cell_fault``) beats that set, where it comes near; ``trace`` what that set's residuals still depend on;
-    ``unseen`` are the sets with one cause more that the data do not exclude, unless structure is left that
-    would pass for it.
+    under the leading set, which leaves the ``faults``; ``load_cell`` is a load cell at fault that comes near
+    that set; ``trace`` what that set's residuals still depend on; ``unseen`` are the sets with one cause more
+    that the data do not exclude, unless structure is left that would pass for it.
     """
 
     word: Word
@@ -51,8 +50,7 @@ class Verdict:
     marginals: dict[str, float]
     size: int
     faults: Faults = FAULTLESS
-    load_cell: float | None = None
-    cell_fault: str = ""
+    load_cell: Rival | None = None
     trace: Structure | None = None
     unseen: frozenset[Set] = frozenset()
 
@@ -99,7 +97,7 @@ def judge(found: Search) -> Verdict:
             standing &= rival.beside
         standing = _outweighing(found, standing)
         held = Verdict("unexplained", leading, standing, probabilities, marginals, size, faults, trace=trace)
-        return replace(held, load_cell=rival.lead, cell_fault=rival.fault) if gives_way else held
+        return replace(held, load_cell=rival) if gives_way else held
     if nothing:
         size = found.best_size(frozenset())
         unseen = _unseen(found, frozenset())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mpam_calib.criticism.unexplained.load_cell import FAULT, LATE, RESCALED, ZEROED
-from mpam_calib.report.numbers import significant
+from mpam_calib.report.numbers import significant, with_band
 
 CELL_FAULTS = {
     FAULT: ("that shows less and less of large forces", "load it with dead weights up to the blocked force"),
@@ -24,6 +24,8 @@ CELL_FAULTS = {
 }
 """What a load cell does that explains the readings, and how to look at it."""
 
+CELL_SIZES = {FAULT: ("cell_knee_N", "from {} N on"), LATE: ("cell_delay_s", "by {} s")}
+"""The parameter of such a fault that is told, and how."""
 
 FAULTS = {
     "repeating_N": "a fine structure of {} N comes back in every stroke at the same place",
@@ -50,10 +52,8 @@ def unremoved(content: dict[str, Any]) -> list[str]:
         share = significant(100.0 * content["saturated_share"])
         found.append(f"the load cell saturates: {share} % of the readings lie at one extreme force")
     found += [said.format(significant(content[name])) for name, said in FAULTS.items() if content[name] > 0.0]
-    if content["load_cell_nats"] is not None:
-        by = "better" if content["load_cell_nats"] > 0.0 else "nearly as well"
-        cell, look = CELL_FAULTS[content["load_cell_fault"]]
-        found.append(f"a load cell {cell} explains the readings {by}: {look}")
+    if content["load_cell"]:
+        found.append(_of_load_cell(**content["load_cell"]))
     elif content["remainder_N"] > 0.0 or not (found or content["trace"]):
         size = significant(content["remainder_N"])
         found.append(f"structure of {size} N is left beside every set tried")
@@ -61,3 +61,13 @@ def unremoved(content: dict[str, Any]) -> list[str]:
         size, against = significant(content["trace"]["rms_N"]), content["trace"]["against"]
         found.append(f"what the likeliest set leaves still depends on {against} ({size} N)")
     return found
+
+
+def _of_load_cell(fault: str, nats: float, parameters: dict[str, dict[str, float]]) -> str:
+    """What a load cell at fault explains, how large the fault is, and where to look for it."""
+    cell, look = CELL_FAULTS[fault]
+    if fault in CELL_SIZES:
+        name, said = CELL_SIZES[fault]
+        _, band = with_band(*(parameters[name][q] for q in ("mean", "q05", "q95")))
+        cell += f" ({said.format(band)})"
+    return f"a load cell {cell} explains the readings {'better' if nats > 0.0 else 'nearly as well'}: {look}"

@@ -24,12 +24,11 @@ from rig import margins, recipes, sets
 from rig.effects import form as rig_form
 
 from mpam_calib.criticism.data.problem import build_problem
-from mpam_calib.criticism.diagnose import DRAWS
 from mpam_calib.criticism.searching.candidates import candidates
 from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.searching.usual_braid import with_strands
-from mpam_calib.criticism.sizes import sizes_of
+from mpam_calib.criticism.sizes import DRAWS, sizes_of
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Options, draw_blueprint

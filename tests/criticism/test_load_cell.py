@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mpam_calib.criticism.diagnose import told_of
 from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.unexplained.load_cell import FAULT, LATE, load_cell_rival
@@ -62,7 +63,7 @@ def test_a_cell_that_saturates_softly_is_no_cause(cell: Callable[[Array], Array]
     assert verdict.leading
     assert (verdict.word, verdict.standing) == ("unexplained", frozenset())
     assert verdict.load_cell is not None
-    assert verdict.load_cell > 10.0
+    assert verdict.load_cell.lead > 10.0
 
 
 def test_a_cause_beside_the_cell_stands() -> None:
@@ -125,7 +126,13 @@ def test_a_cell_that_is_read_late_is_no_friction(name: str, delay: float) -> Non
     problem = problem_of(replace(specimen, loops=replace(loops, force_N=late)))
     verdict = judge(search(problem, ("rate_friction", "pressure_droop")))
     assert verdict.leading
-    assert (verdict.word, verdict.standing, verdict.cell_fault) == ("unexplained", frozenset(), LATE)
+    assert (verdict.word, verdict.standing) == ("unexplained", frozenset())
+    setting = problem.model.setting
+    assert setting is not None
+    told = told_of(verdict.load_cell, setting, 1)
+    assert told is not None
+    assert told["fault"] == LATE
+    assert told["parameters"]["cell_delay_s"]["mean"] == pytest.approx(delay, rel=0.2)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.tasks.spread import Alone
-from mpam_calib.criticism.unexplained.load_cell import FAULT, NO_RIVAL, Rival
+from mpam_calib.criticism.unexplained.load_cell import NO_RIVAL, Rival
 from mpam_calib.criticism.verdict import LISTED, Verdict, judge
 
 CAUSE = frozenset(["length_offset"])
@@ -244,5 +244,4 @@ def test_a_load_cell_that_comes_near_takes_the_name_and_what_it_replaces(
     monkeypatch.setattr(verdict_module, "_standing", lambda found, leading: leading)
     verdict = judge(found)
     assert (verdict.word, verdict.standing) == (word, standing)
-    told = (None, "") if word == "named" else (rival.lead, FAULT)
-    assert (verdict.load_cell, verdict.cell_fault) == told
+    assert verdict.load_cell == (None if word == "named" else rival)

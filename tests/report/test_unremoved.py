@@ -12,28 +12,30 @@ FAULTLESS = {
     **dict.fromkeys(
         ("saturated_share", "repeating_N", "bursts_N", "hum_N", "step_N", "chatter_N", "remainder_N"), 0.0
     ),
-    "load_cell_nats": None,
-    "load_cell_fault": "load_cell",
+    "load_cell": None,
     "trace": None,
 }
 
 
 @pytest.mark.parametrize(
-    ("fault", "said"),
+    ("fault", "size", "said"),
     [
-        ("load_cell", "dead weights up to the blocked force"),
-        ("load_cell:zeroed", "with the muscle unhooked"),
-        ("load_cell:rescaled", "its plug and its range"),
-        ("late_force", "its amplifier's filter"),
+        ("load_cell", " (from 0.110–0.130 N on)", "dead weights up to the blocked force"),
+        ("load_cell:zeroed", "", "with the muscle unhooked"),
+        ("load_cell:rescaled", "", "its plug and its range"),
+        ("late_force", " (by 0.110–0.130 s)", "its amplifier's filter"),
     ],
 )
 @pytest.mark.parametrize(("nats", "by"), [(12.0, "better"), (-2.0, "nearly as well")])
 def test_a_load_cell_at_fault_is_told_with_how_to_look_at_it(
-    fault: str, said: str, nats: float, by: str
+    fault: str, size: str, said: str, nats: float, by: str
 ) -> None:
-    (text,) = unremoved(FAULTLESS | {"load_cell_nats": nats, "load_cell_fault": fault})
+    band = {"mean": 0.12, "sd": 0.006, "q05": 0.11, "q95": 0.13}
+    parameters = dict.fromkeys(("cell_loss_N", "cell_knee_N", "cell_delay_s", "cell_zero_1_N"), band)
+    told = {"fault": fault, "nats": nats, "parameters": parameters}
+    (text,) = unremoved(FAULTLESS | {"load_cell": told})
     assert said in text
-    assert f"explains the readings {by}" in text
+    assert f"{size} explains the readings {by}" in text
 
 
 def test_every_fault_of_the_load_cell_has_words() -> None:

@@ -15,6 +15,7 @@ from math import log
 import numpy as np
 
 from mpam_calib.criticism.data.problem import SIZE_PRIOR, SIZES
+from mpam_calib.criticism.fitting.fit import Fit
 from mpam_calib.criticism.fitting.refits import Set, Try, best_of, ended
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.model.effect import effect
@@ -32,11 +33,12 @@ FAR = 3.0
 
 @dataclass(frozen=True)
 class Rival:
-    """The best set with a load cell's ``fault``: nats by which it leads the leading set, causes beside it."""
+    """The best set with a load cell's ``fault``: nats ahead of the leading set, causes beside it, fit."""
 
     lead: float
     beside: Set
     fault: str = FAULT
+    fitted: Fit | None = None
 
 
 NO_RIVAL = Rival(-np.inf, frozenset())
@@ -58,17 +60,22 @@ def _rival(found: Search, leading: Set, fault: str) -> Rival:
     sets = [frozenset(c) for k in range(most + 1) for c in combinations(sorted(leading), k)]
     keys = list(product(sets, sorted({0, found.best_size(leading)})))
     fits = found.spread(best_of, [(size, _tries(found, s, size, fault), found.doubting) for s, size in keys])
-    terms: dict[Set, list[float]] = {}
+    by_set: dict[Set, list[tuple[float, Fit]]] = {}
     for (beside, size), fitted in zip(keys, fits, strict=True):
         if fitted is not None:
-            terms.setdefault(beside, []).append(fitted.log_evidence + log(SIZE_PRIOR[size]))
-    scores = {s: float(np.logaddexp.reduce(t)) + found.log_prior(s | {FAULT}) for s, t in terms.items()}
+            term = fitted.log_evidence + log(SIZE_PRIOR[size])
+            by_set.setdefault(beside, []).append((term, fitted))
+    scores = {
+        s: float(np.logaddexp.reduce([term for term, _ in terms])) + found.log_prior(s | {FAULT})
+        for s, terms in by_set.items()
+    }
     if not scores:
         return NO_RIVAL
     best = max(scores, key=lambda s: scores[s])
+    _, fitted = max(by_set[best], key=lambda term: term[0])
     # What opens a loop beside a cell that is read late may be no more than how that is reckoned.
     beside = best - BY_DIRECTION if fault == LATE else best
-    return Rival(scores[best] - found.score_of_best(leading), beside, fault)
+    return Rival(scores[best] - found.score_of_best(leading), beside, fault, fitted)
 
 
 def _tries(found: Search, beside: Set, size: int, fault: str) -> list[Try]:
