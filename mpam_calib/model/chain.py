@@ -45,7 +45,7 @@ class Terms(NamedTuple):
 
 
 class Factors(NamedTuple):
-    """F = fixed + slope·(columns·η): newtons, shapes (B, n), (B or 1, n) and, multiplied out, (B or 1, n, p).
+    """F = fixed + slope·(columns·η): newtons, (B, n), (B or 1, n or 1) and, multiplied out, (B or 1, n, p).
 
     ``beside`` (B or 1, n) is the part of the fixed force, N, that is none of the muscle's pull: friction that
     is not in proportion to it, and the load cell's zero.
@@ -68,13 +68,22 @@ class Unsigned(NamedTuple):
     beside: Array
     state: State
 
+    @property
+    def signed(self) -> bool:
+        """Whether it matters which way the muscle pulls."""
+        return bool(np.any(self.state.coulomb))
+
     def pulling(self, guide: Array | None) -> Factors:
         """With the signs that a force estimate (B or 1, n), N, says; without one the muscle pulls."""
-        # Coulomb's law goes by what the muscle itself pulls, not by what the load cell reads.
-        pull = np.ones(1) if guide is None else np.sign(guide - self.beside)
         state = self.state
-        factor = coulomb_factor(state.friction_gain * state.coulomb, state.sign, pull)
-        slope = state.gain * (factor + _tightened(state))
+        factor = np.ones((1, 1))
+        if self.signed:
+            # Coulomb's law goes by what the muscle itself pulls, not by what the load cell reads.
+            pull = np.ones(1) if guide is None else np.sign(guide - self.beside)
+            factor = coulomb_factor(state.friction_gain * state.coulomb, state.sign, pull)
+        if np.any(state.tightening):
+            factor = factor + _tightened(state)
+        slope = state.gain * factor
         return Factors(slope * self.fixed + self.beside, slope, self.columns, self.beside)
 
 

@@ -195,7 +195,9 @@ class Columns(NamedTuple):
         terms, order = self.h.shape[2], self.per_modulus.shape[2]
         each = coefficients.reshape(len(coefficients), 1, terms, order)
         moduli = self.h[..., 0] @ each[:, 0] if self.h.shape[3] == 1 else (self.h * each).sum(axis=2)
-        force = sum(self.per_modulus[..., k] * moduli[..., k] for k in range(order))
+        force = self.per_modulus[..., 0] * moduli[..., 0]
+        for k in range(1, order):
+            force = force + self.per_modulus[..., k] * moduli[..., k]
         return np.asarray(self.gain * force)
 
 

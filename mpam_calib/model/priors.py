@@ -103,7 +103,7 @@ class LongTailed:
 
     def from_normal(self, u: Array) -> Array:
         """scale·δ·sinh(arsinh(u)/δ)."""
-        return self.scale * TAIL * np.sinh(np.arcsinh(u) / TAIL)
+        return self.scale * _drawn_out(u)
 
     def to_normal(self, x: Array) -> Array:
         """Inverse of :meth:`from_normal`."""
@@ -121,6 +121,10 @@ class LongTailed:
     def widened(self, factor: float) -> LongTailed:
         """Zero stays the middle."""
         return LongTailed(factor * self.scale)
+
+
+def _drawn_out(z: Array) -> Array:
+    return TAIL * np.sinh(np.arcsinh(z) / TAIL)
 
 
 @cache
@@ -226,7 +230,7 @@ class HalfNormal:
 
     def from_normal(self, u: Array) -> Array:
         """The value with the same upper-tail probability (accurate in both tails)."""
-        return -self.scale * special.ndtri(special.ndtr(-np.clip(u, -_FAR, 37.0)) / 2.0)
+        return self.scale * _folded(u)
 
     def to_normal(self, x: Array) -> Array:
         """Inverse of :meth:`from_normal`."""
@@ -246,6 +250,10 @@ class HalfNormal:
         return HalfNormal(factor * self.scale)
 
 
+def _folded(u: Array) -> Array:
+    return -special.ndtri(special.ndtr(-np.clip(u, -_FAR, 37.0)) / 2.0)
+
+
 @dataclass(frozen=True)
 class HalfLongTailed:
     """|LongTailed(scale)|: a size with one sign, of which nobody knows how large it can be."""
@@ -257,7 +265,7 @@ class HalfLongTailed:
 
     def from_normal(self, u: Array) -> Array:
         """The half-normal's value, its tail drawn out as :class:`LongTailed` does."""
-        return LongTailed(self.scale).from_normal(HalfNormal(1.0).from_normal(u))
+        return self.scale * _drawn_out(_folded(u))
 
     def to_normal(self, x: Array) -> Array:
         """Inverse of :meth:`from_normal`."""

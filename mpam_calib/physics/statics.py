@@ -66,7 +66,7 @@ def modulus_columns(shape: Shape, rest: Rest, convention: str, order: int) -> Ar
         axial, hoop = axial * z, hoop * x
         columns.append(axial - hoop)
     # A few moduli and many readings: products with pressure run along the readings.
-    return np.moveaxis(np.stack(columns), 0, -1)
+    return np.stack(columns).transpose(*range(1, axial.ndim + 1), 0)
 
 
 def braid_energy_force(P: Array, L: Array, rest: Rest, E_br: float, R_br: float, n: int) -> Array:

@@ -17,7 +17,7 @@ from scipy.linalg import lapack
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.model.bend import is_bend
 from mpam_calib.model.chain import Chain, Unsigned
-from mpam_calib.model.priors import LongTailed, Parameter, Prior
+from mpam_calib.model.priors import LongTailed, Normal, Parameter, Prior
 
 Array = NDArray[np.float64]
 
@@ -140,17 +140,21 @@ class Climb:
         return self.problem.white(self.extra, self.size)
 
     @cached_property
-    def _alike(self) -> list[tuple[Prior, slice]]:
-        """The priors, each with the neighbouring coordinates that share it."""
-        runs = [(prior, len(list(same))) for prior, same in groupby(p.prior for p in self.chain.parameters)]
-        ends = np.cumsum([count for _, count in runs]).tolist()
-        return [(prior, slice(end - count, end)) for (prior, count), end in zip(runs, ends, strict=True)]
+    def _alike(self) -> list[tuple[Callable[[Array], Array], slice]]:
+        """What makes values of coordinates: once for neighbours that share a prior, or are normal."""
+        priors = [p.prior for p in self.chain.parameters]
+        found, end = [], 0
+        for key, same in groupby(priors, key=lambda prior: Normal if isinstance(prior, Normal) else prior):
+            run = list(same)
+            start, end = end, end + len(run)
+            found.append((_normals(run) if key is Normal else run[0].from_normal, slice(start, end)))
+        return found
 
     def values(self, u: Array) -> dict[str, Array]:
         """Values (B, 1) for coordinates u (B, d)."""
         if not self.names:
             return {"": np.zeros((len(u), 1))}
-        every = np.concatenate([prior.from_normal(u[:, alike]) for prior, alike in self._alike], axis=1)
+        every = np.concatenate([of(u[:, alike]) for of, alike in self._alike], axis=1)
         return {name: every[:, i : i + 1] for i, name in enumerate(self.names)}
 
     def guide(self) -> Array:
@@ -160,12 +164,13 @@ class Climb:
     def look(self, u: Array, guide: Array, eta: Array) -> Place:
         """Linearise at u; ``eta`` (p,) serves where the force depends on itself."""
         problem, p = self.problem, self.chain.linear_size
-        readings, first, second = problem.lean
+        _, first, second = problem.lean
         points, guides, nudge = u + self._offsets, guide, NUDGE * problem.force_scale
         if self.chain.uses_force:
             points = np.concatenate([points, points[:1]])
             guides = _nudged(guide, len(points), nudge)
-        fixed, slope, columns, beside = self._unsigned(points, guides).pulling(guides)
+        unsigned = self._unsigned(points, guides)
+        fixed, slope, columns, beside = unsigned.pulling(guides)
         factor = np.ones(1)
         if self.chain.uses_force:
             # A force that depends on itself, F = f(F): one Newton step of its fixed point, for all at once.
@@ -177,9 +182,8 @@ class Climb:
 
         here = guide + (fixed[0] - guide) * factor
         per_eta = rows(factor * slope[0] * columns.first().every()[0].T).T
-        white = problem.white(
-            np.column_stack([problem.force - (rows(here) + problem.bow), per_eta]), self.size
-        )
+        known = problem.force - (rows(here) + problem.bow)
+        white = problem.white(np.concatenate([known[:, None], per_eta], axis=1), self.size)
         X = np.concatenate([white[:, 1:], self._extra], axis=1)
         # Given the sizes, the linear coordinates' optimum is exact.
         best = _solve(plus_one(X.T @ X), X.T @ white[:, 0])
@@ -187,8 +191,13 @@ class Climb:
         force = fixed + slope * columns.times(best[:p])
         if self.chain.uses_force:
             force = guide + (force - guide) * factor
-        force = np.broadcast_to(force, (len(points), len(readings)))[: len(self._offsets)]
+        if len(force) == 1:  # alike for all
+            force = np.broadcast_to(force, points.shape[:1] + force.shape[1:])
+        force = force[: len(self._offsets)]
         whole = rows(force) + problem.bow
+        taken = np.sign(guide - beside[0])
+        # Where no friction asks which way the muscle pulls, and nothing feeds on the force, any sign will do.
+        matters = unsigned.signed or self.chain.uses_force
         objective = -0.5 * float(residual @ residual + u @ u + best @ best)
         return Place(
             u=u,
@@ -198,8 +207,8 @@ class Climb:
             moved=self._moved(whole),
             force=whole[0],
             guide=force[0],
-            taken=np.sign(guide - beside[0]),
-            pulls=np.sign(force[0] - beside[0]),
+            taken=taken,
+            pulls=np.sign(force[0] - beside[0]) if matters else taken,
             objective=objective if np.isfinite(objective) else -np.inf,
         )
 
@@ -316,6 +325,14 @@ class Climb:
             u = np.clip(best.u + step[:d], -furthest, furthest)
         assert best is not None
         return best
+
+
+def _normals(priors: Sequence[Prior]) -> Callable[[Array], Array]:
+    """Values (B, k) of the coordinates (B, k) of normal priors."""
+    origin = np.zeros(1)
+    mean = np.concatenate([prior.from_normal(origin) for prior in priors])
+    sd = np.array([prior.sd for prior in priors])
+    return lambda u: mean + sd * u
 
 
 def plus_one(matrix: Array) -> Array:
