@@ -71,7 +71,7 @@ class Unsigned(NamedTuple):
     @property
     def signed(self) -> bool:
         """Whether it matters which way the muscle pulls."""
-        return bool(np.any(self.state.coulomb))
+        return bool(self.state.coulomb.any())
 
     def pulling(self, guide: Array | None) -> Factors:
         """With the signs that a force estimate (B or 1, n), N, says; without one the muscle pulls."""
@@ -81,7 +81,7 @@ class Unsigned(NamedTuple):
             # Coulomb's law goes by what the muscle itself pulls, not by what the load cell reads.
             pull = np.ones(1) if guide is None else np.sign(guide - self.beside)
             factor = coulomb_factor(state.friction_gain * state.coulomb, state.sign, pull)
-        if np.any(state.tightening):
+        if state.tightening.any():
             factor = factor + _tightened(state)
         slope = state.gain * factor
         return Factors(slope * self.fixed + self.beside, slope, self.columns, self.beside)
@@ -226,7 +226,7 @@ class Chain:
         """Friction (N) beside what is in proportion to the force; history acts on it as on the force."""
         braid = self.setting.braid
         force = state.drag
-        if braid is not None and np.any(state.strand):
+        if braid is not None and state.strand.any():
             unit = strand_friction_per_f_s(state.pressure, state.length, state.rest, braid.E_br, braid.nu_s)
             force = force + state.friction_gain * state.strand * unit
         result: Array = state.gain * state.sign * force
