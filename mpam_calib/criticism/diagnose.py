@@ -9,7 +9,6 @@ from typing import Any
 
 from mpam_calib.criticism.budget import Budget, misfit_budget
 from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
-from mpam_calib.criticism.fitting.refits import Set
 from mpam_calib.criticism.gain import Gain, measure_gain
 from mpam_calib.criticism.limits import Band, hidden_sizes
 from mpam_calib.criticism.searching.candidates import Candidates, candidates
@@ -183,12 +182,8 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
 def _cause(diagnosis: Diagnosis, identifier: str, seed: int) -> dict[str, Any]:
     """One cause: its probability, parameters (lab units), share and whether it was to be expected."""
     verdict, sizes = diagnosis.verdict, diagnosis.sizes
-    setting = sizes.setting
     written = next(e for e in sizes.fits[0].effects if e.partition(":")[0] == identifier)
     told = sizes.told(written, seed)
-    declared = {"braid_angle": setting.geometry.sd.alpha0, "dead_band": setting.pressure_bias_sd}
-    size = next(iter(told.values()))  # the others shape it
-    within = abs(size.mean) <= 2.0 * declared.get(identifier, 0.0)
     return {
         "id": identifier,
         "form": written.partition(":")[2],
@@ -196,8 +191,15 @@ def _cause(diagnosis: Diagnosis, identifier: str, seed: int) -> dict[str, Any]:
         "probability": _round(verdict.marginals[identifier]),
         "parameters": _in_lab_units(told),
         "share_of_misfit": _round(diagnosis.budget.shares[identifier]),
-        "within_declared_uncertainty": within,
+        "within_declared_uncertainty": within_declared(identifier, told, sizes.setting),
     }
+
+
+def within_declared(identifier: str, told: dict[str, Told], setting: Setting) -> bool:
+    """Whether a cause's size is within two of the sds that the specimen declares for it."""
+    declared = {"braid_angle": setting.geometry.sd.alpha0, "dead_band": setting.pressure_bias_sd}
+    size = next(iter(told.values()), None)  # the others shape it; some causes have none
+    return size is not None and abs(size.mean) <= 2.0 * declared.get(identifier, 0.0)
 
 
 def _in_lab_units(told: dict[str, Told]) -> dict[str, dict[str, float]]:
@@ -232,5 +234,4 @@ def _round(x: float) -> float:
 
 def extended_effects(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Effects of the extended simulation: the declared ones and the causes."""
-    causes: Set = frozenset(diagnosis.declared_forms)
-    return (*diagnosis.problem.blueprint.simulation.effects, *sorted(causes))
+    return (*diagnosis.problem.blueprint.simulation.effects, *diagnosis.declared_forms)

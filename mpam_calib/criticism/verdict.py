@@ -37,8 +37,8 @@ its root mean square as a share of a reading's noise: the tests suppose that the
 class Verdict:
     """The word, the leading set, and every set with its probability (best first).
 
-    ``standing`` are the causes that hold even beside a remainder; ``size`` indexes the remainder's size
-    under the leading set, which leaves the ``faults``; ``load_cell`` is a load cell at fault that comes near
+    ``standing`` are the causes that hold even beside a remainder; the leading set leaves the ``faults``;
+    ``load_cell`` is a load cell at fault that comes near
     that set; ``trace`` what that set's residuals still depend on; ``unseen`` are the sets with one cause more
     that the data do not exclude, unless structure is left that would pass for it.
     """
@@ -48,7 +48,6 @@ class Verdict:
     standing: Set
     probabilities: dict[Set, float]
     marginals: dict[str, float]
-    size: int
     faults: Faults = FAULTLESS
     load_cell: Rival | None = None
     trace: Structure | None = None
@@ -96,16 +95,15 @@ def judge(found: Search) -> Verdict:
         if gives_way:
             standing &= rival.beside
         standing = _outweighing(found, standing)
-        held = Verdict("unexplained", leading, standing, probabilities, marginals, size, faults, trace=trace)
+        held = Verdict("unexplained", leading, standing, probabilities, marginals, faults, trace=trace)
         return replace(held, load_cell=rival) if gives_way else held
     if nothing:
-        size = found.best_size(frozenset())
         unseen = _unseen(found, frozenset())
-        return Verdict("adequate", frozenset(), frozenset(), probabilities, marginals, size, unseen=unseen)
+        return Verdict("adequate", frozenset(), frozenset(), probabilities, marginals, unseen=unseen)
     lead = scores[0] - scores[1] if len(scores) > 1 else np.inf
     word: Word = "named" if probabilities[leading] >= SURE and lead >= LEAD else "ambiguous"
     unseen = _unseen(found, leading)
-    return Verdict(word, leading, leading, probabilities, marginals, size, unseen=unseen)
+    return Verdict(word, leading, leading, probabilities, marginals, unseen=unseen)
 
 
 def _unseen(found: Search, base: Set) -> frozenset[Set]:

@@ -9,6 +9,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from mpam_calib.criticism.diagnose import Diagnosis
+from mpam_calib.criticism.fitting.fit import by_equations
 from mpam_calib.criticism.verdict import BESIDE, TRACE, TRACE_SIZE
 from mpam_calib.model.bend import FORM, is_bend
 from mpam_calib.model.effect import effect
@@ -204,20 +205,21 @@ def _structure(content: dict[str, Any]) -> list[Block]:
 
 def _budget(found: Diagnosis, content: dict[str, Any]) -> list[Block]:
     names = [effect(c["id"]).title for c in content["causes"]]
-    before = content["misfit_before_N"]
-    newtons = [before * float(np.sqrt(max(c["share_of_misfit"], 0.0))) for c in content["causes"]]
+    misfit_before = content["misfit_before_N"]
+    newtons = [misfit_before * float(np.sqrt(max(c["share_of_misfit"], 0.0))) for c in content["causes"]]
     left = content["misfit_after_N"]
     problem, search = found.problem, found.search
     standing = found.verdict.standing
-    fits = [search.fits[frozenset(), 0], search.fits[standing, 0]]
+    # By its equations, as the bars: what a doubt about them adds would hide, or make, structure.
+    before, after = (by_equations(problem, search.fits[s, 0]) for s in (frozenset[str](), standing))
     middle = problem.middle()
     assert problem.model.setting is not None
     maps = misfit.residual_maps(
         middle.displacement / problem.model.setting.geometry.L0,
         middle.sign,
         problem.model.setting.levels[problem.level] / KPA,
-        problem.force - fits[0].force,
-        problem.force - fits[1].force,
+        problem.force - before,
+        problem.force - after,
         float(np.sqrt(np.median(np.diagonal(problem.noise)))),
     )
     return [

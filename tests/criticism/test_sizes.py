@@ -10,10 +10,11 @@ from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.diagnose import within_declared
 from mpam_calib.criticism.fitting.fit import Fit, Under, chain_for, fit
 from mpam_calib.criticism.fitting.forms import forms_of, price
 from mpam_calib.criticism.searching.searched import Search
-from mpam_calib.criticism.sizes import EXCLUDED, Sizes, sizes_of
+from mpam_calib.criticism.sizes import EXCLUDED, Sizes, Told, sizes_of
 from mpam_calib.criticism.tasks.spread import Alone
 from mpam_calib.model.effect import effect
 
@@ -98,3 +99,23 @@ def test_the_band_of_a_size_covers_whatever_form_was_due(problem: Problem) -> No
     print(f"inside {inside[0]} of {TESTS}, by the likeliest form alone {inside[1]}")
     assert inside[0] / TESTS > 0.9 - 3.0 * np.sqrt(0.9 * 0.1 / TESTS)
     assert inside[1] < inside[0]
+
+
+def test_a_cause_may_have_no_size(problem: Problem) -> None:
+    """Another law of the radius has no parameter: it is there or not."""
+    setting = problem.model.setting
+    assert setting is not None
+    found = fit(problem, frozenset({"braid_kinematics"}), 0)
+    told = Sizes((found,), setting).told("braid_kinematics", 1)
+    assert told == {}
+    assert not within_declared("braid_kinematics", told, setting)
+
+
+@pytest.mark.parametrize(("sds", "within"), [(-1.9, True), (2.1, False)])
+def test_a_size_is_held_against_its_declared_sd(problem: Problem, sds: float, within: bool) -> None:
+    assert problem.model.setting is not None
+    sd = 2e3
+    setting = replace(problem.model.setting, pressure_bias_sd=sd)
+    told = {"P_DB_kPa": Told(sds * sd, 0.1 * sd, 0.0, 0.0)}
+    assert within_declared("dead_band", told, setting) is within
+    assert not within_declared("tip_shape", told, setting)

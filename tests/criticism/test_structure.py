@@ -57,7 +57,7 @@ def test_p_values_are_spread_evenly_over_noise() -> None:
         noisy = replace(problem, force=base.force + root @ rng.standard_normal(len(problem)))
         for test in structure_tests(noisy, fit(noisy, frozenset(), 0)):
             p_values.setdefault(test.against, []).append(test.p_value)
-    assert len(p_values) == 7
+    assert p_values.keys() == structure.AGAINST.keys() - {"speed"}  # there is one
     for against, values in p_values.items():
         assert stats.kstest(values, "uniform").pvalue > 1e-3, against
 
@@ -99,6 +99,22 @@ def test_the_size_of_structure_is_that_of_what_was_added(
     found = structure_tests(replace(problem, force=problem.force + added), fitted)
     size = next(t.size for t in found if t.against == against)
     assert size == pytest.approx(np.std(added), rel=0.25)
+
+
+def test_speed_is_tested_where_speeds_differ(null: tuple[Problem, Fit]) -> None:
+    """Of one speed, what differs between the branches is no function of it."""
+    problem, fitted = null
+    readings = replace(problem.readings, speed=np.full(len(problem.readings), 1e-3))
+    even = replace(problem, readings=readings)
+    assert "speed" not in {t.against for t in structure_tests(even, fitted)}
+    fast = np.where(problem.cycle % 2 == 0, 4e-3, 1e-3)
+    uneven = replace(problem, readings=replace(readings, speed=np.concatenate([fast, fast])))
+    middle = uneven.middle()
+    added = {"branch": middle.sign, "speed": middle.sign * np.log(middle.speed / 2e-3)}
+    for against, shape in added.items():
+        there = replace(uneven, force=problem.force + problem.noise_level.total * shape)
+        found = structure_tests(there, fitted)
+        assert min(found, key=lambda t: t.p_value).against == against
 
 
 @pytest.mark.parametrize("name", NULLS)

@@ -224,7 +224,7 @@ def test_an_adequate_simulation_is_told_with_its_own_remainder_and_what_could_hi
     found.fits[CAUSE, 0] = cause
     behind_by(found, CAUSE, gap)
     verdict = judge(found)
-    assert (verdict.word, verdict.leading, verdict.size) == ("adequate", NOTHING, 1)
+    assert (verdict.word, verdict.leading) == ("adequate", NOTHING)
     assert verdict.unseen == ({CAUSE} if hidden else set())
 
 

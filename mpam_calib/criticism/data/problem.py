@@ -257,7 +257,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     model = build_model(blueprint)
     assert model.setting is not None
     scale = model.setting.force_scale
-    parts: list[tuple[Readings, Readings, Array, Ints, Array]] = []
+    parts: list[tuple[Readings, Readings, Array, Ints]] = []
     noise: NoiseLevel | None = None
     blocks: list[Array] = []
     ties: list[Array] = []
@@ -289,7 +289,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
             full[np.ix_(rows, rows)] = padded[segment][np.ix_(at, at)]
         larger = grown(np.array(noise.growth), bins.force[keep], scale)
         low, high = bins.readings.take(keep), bins.readings.take(keep + n)
-        parts.append((low, high, bins.force[keep], bins.segment[keep], np.zeros(0)))
+        parts.append((low, high, bins.force[keep], bins.segment[keep]))
         own, shared = _held(bins, keep)
         blocks.append(larger[:, None] * larger * full + own)
         ties.append(shared)
@@ -301,7 +301,7 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
             guessed = not told
             noise = NoiseLevel(told or FORCE_MAP_NOISE * scale, 0.0, 1.0)
         rows_of = points.readings.take(keep)
-        parts.append((rows_of, rows_of, points.force[keep], np.full(len(keep), -1), np.zeros(0)))
+        parts.append((rows_of, rows_of, points.force[keep], np.full(len(keep), -1)))
         blocks.append(np.diag((noise.total * grown(np.array(noise.growth), points.force[keep], scale)) ** 2))
         ties.append(np.zeros((len(keep), 2)))
     assert noise is not None

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -18,12 +19,14 @@ from scipy import linalg, stats
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import Fit
 from mpam_calib.criticism.fitting.predicted import linearise
+from mpam_calib.criticism.searching.candidates import SPEEDS_APART
 from mpam_calib.model.readings import Readings
 
 Array = NDArray[np.float64]
 
 DEGREE = 5
 RANK_TOLERANCE = 1e-6
+NEED_CLOCK = ("time", "time at the level", "cycle", "speed")
 
 
 @dataclass(frozen=True)
@@ -43,21 +46,34 @@ def _smooth(x: Array, degree: int = DEGREE) -> Array:
     return np.asarray(legendre.legvander(2.0 * (x - x.min()) / span - 1.0, degree)[:, 1:])
 
 
-def _groups(labels: Array) -> Array:
+def _groups(labels: NDArray[Any]) -> Array:
     """Indicator columns of all groups but the first, (n, groups − 1)."""
     return np.asarray((labels[:, None] == np.unique(labels)[1:]).astype(np.float64))
 
 
+def _along_speed(speed: Array, sign: Array) -> Array:
+    """Functions of the logarithm of the speed (n, 3), one of them of either sign by the branch.
+
+    About the usual speed, which rows at rest are given: a difference between the branches alone is none of
+    the speed's. None where all rows have one speed.
+    """
+    moving = speed > 0.0
+    log = np.log(speed[moving])
+    if not len(log) or np.ptp(log) < np.log(SPEEDS_APART):
+        return np.empty((len(speed), 0))
+    about = np.zeros(len(speed))
+    about[moving] = log - log.mean()
+    return np.column_stack([_smooth(about, 2), sign * about])
+
+
 AGAINST: dict[str, Callable[[Readings], Array]] = {
     "contraction": lambda r: _smooth(r.displacement),
-    "pressure": lambda r: _groups(r.level.astype(np.float64)),
+    "pressure": lambda r: _groups(r.level),
     "branch": lambda r: r.sign[:, None] * np.column_stack([np.ones(len(r)), _smooth(r.displacement, 3)]),
     "time": lambda r: _smooth(r.time),
     "time at the level": lambda r: _smooth(np.log1p(r.time_at_level)),
     "cycle": lambda r: _groups(r.cycle),
-    "speed": lambda r: np.column_stack(
-        [_smooth(np.log(s := np.maximum(r.speed, 1e-9)), 2), r.sign * np.log(s)]
-    ),
+    "speed": lambda r: _along_speed(r.speed, r.sign),
 }
 
 
@@ -75,7 +91,7 @@ def structure_tests(problem: Problem, fitted: Fit) -> list[Structure]:
     readings = replace(problem.middle(), level=problem.level)
     found = []
     for name, columns in AGAINST.items():
-        if name in ("time", "time at the level", "cycle") and not problem.has_clock:
+        if name in NEED_CLOCK and not problem.has_clock:
             continue
         seen = white(columns(readings))
         basis = _basis(seen - taken @ (taken.T @ seen))
