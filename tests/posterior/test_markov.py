@@ -68,3 +68,16 @@ def test_a_stroke_that_turns_back_is_left_to_the_dense_covariance():
     theta = {name: float(v[0, 0]) for name, v in values.items()}
     slow = Twin(made, blueprint).log_likelihood(theta, None, None, None)
     assert target.log_likelihood(values)[0] == pytest.approx(slow, rel=1e-8)
+
+
+def test_the_only_reading_of_a_stroke_has_the_noise_of_one_reading():
+    """It takes no time; whatever the noise's time constant, its variance is white² + correlated²."""
+    whole = RECORDED.stroke == RECORDED.stroke[-1]
+    alone = RECORDED.without(whole & (np.cumsum(whole) > 1))
+    layout = StrokeCovariance.build(bin_loops(alone))
+    times = np.array([0.02, 0.2, 1.0, 30.0])
+    white, correlated = np.full(4, 0.2), np.full(4, 0.5)
+    dense = layout.matrix(white, correlated, times, np.zeros(4))
+    kind = layout.kind[-1]
+    assert layout.pad[-1].sum() == layout.pad.shape[1] - 1
+    assert dense[:, kind, 0, 0] == pytest.approx(np.full(4, 0.04 + 0.25), rel=1e-6)

@@ -12,6 +12,7 @@ from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.readings import FAR, TIMES
 from mpam_calib.posterior.likelihood.bins import bin_loops
 from mpam_calib.posterior.likelihood.row_motion import row_readings
+from mpam_calib.posterior.likelihood.white import Nodes
 from mpam_calib.specimen.recording import Loops
 
 STROKE, HALF = 0.012, 6.0
@@ -268,3 +269,26 @@ def test_a_stroke_knows_what_was_stretched_before():
         np.testing.assert_array_equal(point.behind[first], 0.0)
         longest = float(made.displacement_m.max())
         assert point.behind[others] == pytest.approx(longest - point.displacement[others], abs=1e-3 * STROKE)
+
+
+def test_nodes_of_a_bin_have_the_motion_of_its_rows():
+    """All that changes along a stroke: on average over the bin, and not alike at its nodes."""
+    made = build.loops((100.0, 150.0), 12.0, 40, cycles=2)
+    rows = row_readings(made)
+    start = np.arange(0, len(rows), 20)
+    nodes = Nodes.build(made.force_N, rows, start)
+    weight = nodes.weight.reshape(3, -1)
+    changing = {
+        name
+        for name in vars(rows)
+        if np.ptp(value := np.asarray(getattr(rows, name))[:20], axis=0).max() > 1e-9 * np.abs(value).max()
+    }
+    assert {"displacement", "time", "travel", "time_at_level"} <= changing
+    back = np.asarray(rows.behind)[40:60]
+    assert np.ptp(back) > 0.0
+    for name in changing | {"behind"}:
+        at_nodes = np.asarray(getattr(nodes.readings, name))
+        at_nodes = at_nodes.reshape(3, len(start), -1)
+        own = np.asarray(getattr(rows, name)).reshape(len(start), 20, -1).mean(axis=1)
+        mean = np.sum(weight[..., None] * at_nodes, axis=0) / weight.sum(axis=0)[:, None]
+        assert mean == pytest.approx(own, abs=1e-9 * np.abs(own).max()), name

@@ -198,9 +198,9 @@ def _kinds(
 
 def _of_means(rows: Array, log_rho: Array) -> tuple[Array, Array]:
     """AR(1) of variance 1, means of n rows: Σ ρ^i / n over a bin's rows, and the mean's own variance."""
-    rho = np.exp(log_rho)
-    series = -np.expm1(rows * log_rho) / (1.0 - rho)
-    own = (rows * (1.0 + rho) / (1.0 - rho) - 2.0 * rho * series / (1.0 - rho)) / rows**2
+    rho, apart = np.exp(log_rho), -np.expm1(log_rho)  # 1 − ρ, of a stroke of one reading next to none
+    series = -np.expm1(rows * log_rho) / apart
+    own = (rows * (1.0 + rho) - 2.0 * rho * series) / apart / rows**2
     return series / rows, own
 
 

@@ -71,7 +71,16 @@ class Nodes:
 
         at_nodes, left = fit(force)
         at_rows = Readings.join([rows.take(start)] * 3)
-        moving = ("pressure", "displacement", "time", "file_time", "time_at_level", "travel", "speed")
+        moving = (
+            "pressure",
+            "displacement",
+            "time",
+            "file_time",
+            "time_at_level",
+            "travel",
+            "behind",
+            "speed",
+        )
         moved = {name: fit(getattr(rows, name))[0].ravel() for name in moving}
         moved["relaxed"] = np.stack([fit(one)[0].ravel() for one in rows.relaxed.T], axis=1)
         return Nodes(
