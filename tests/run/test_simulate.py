@@ -81,6 +81,17 @@ def test_declared_moduli_are_put_in_as_declared(tmp_path: Path) -> None:
     assert put["K_f"] == pytest.approx(0.0787)
 
 
+def test_without_data_a_size_refers_to_the_test_that_is_made(tmp_path: Path) -> None:
+    """A zero that wanders out until half the test and back by its end: 0.6 N/min × half the test, there."""
+    simulation = '[simulation]\nmoduli = "tensile"\nE_Pa = [4.0e4, 2.6e4]\nfriction = "coulomb"\n'
+    specimen = read(Specimen(simulation=simulation).write(tmp_path / "own"), data_required=False)
+    plain, wandering = (simulate(specimen, h).specimen.loops for h in ({}, {"force_drift:return": 0.6}))
+    assert plain is not None and wandering is not None
+    half = plain.time_s.max() / 2.0
+    out = (0.6 / 60.0) * half * np.sin(np.pi * plain.time_s / (2.0 * half))
+    assert wandering.force_N - plain.force_N == pytest.approx(out, abs=0.01 * out.max())
+
+
 def test_an_effect_may_be_hidden_in_another_form(muscle: Path, tmp_path: Path, here: Here) -> None:
     """Relaxation by a power of time: its size is the effect's, its power a typical one."""
     assert here("simulate", muscle, "-o", tmp_path / "made", "--hide", "creep:power=0.02").code == 0
