@@ -60,6 +60,18 @@ class DeclaredFriction:
             return state._replace(coulomb=state.coulomb + factor)
         return state._replace(strand=state.strand + factor)
 
+    def as_others_say(self, values: Values, level: int) -> dict[str, Array]:
+        """Values (B, 1) in which one level's own factor is what its neighbours' come to at its pressure.
+
+        So is that of a pressure between levels; beyond them it is the nearest level's.
+        """
+        if not self.by_level:
+            return dict(values)
+        levels, others = self.setting.levels, np.delete(np.arange(self.by_level), level)
+        weights = [float(np.interp(levels[level], levels[others], one)) for one in np.eye(len(others))]
+        said = sum(w * values[self.names[i]] for w, i in zip(weights, others, strict=True))
+        return {**values, self.names[level]: np.asarray(said)}
+
     def _at(self, readings: Readings, factors: Array) -> Array:
         """The factors (B, levels) at the readings, (B, n): that of the own level, else interpolated."""
         known = readings.level >= 0

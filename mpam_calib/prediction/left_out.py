@@ -85,7 +85,7 @@ def _rows(specimen: Specimen, target: Collapsed, draws: Draws, seed: int) -> lis
         u = _reweighted(fold, thinned, whole, rng)
         if u is None:
             continue
-        force, seen = _predict(fold, u, held, rng)
+        force, seen = _predict(fold, int(level), u, held, rng)
         low, high = np.quantile(seen, [0.05, 0.95], axis=0)
         miss = held.force - force.mean(axis=0)
         rows.append(
@@ -147,11 +147,14 @@ def _reweighted(fold: Collapsed, draws: Draws, whole: Array, rng: np.random.Gene
     return proposed[rng.choice(PROPOSED, len(draws), p=np.exp(weight))]
 
 
-def _predict(fold: Collapsed, u: Array, held: _Held, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Force (N, n) with all that the simulation may miss, and readings of it."""
+def _predict(
+    fold: Collapsed, level: int, u: Array, held: _Held, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Force (N, n) at a level with all that the simulation may miss, and readings of it."""
     model, size = fold.model, batch_size(fold)
-    assert model.setting is not None
-    values = model.values(u)
+    assert model.setting is not None and model.chain is not None
+    # Of a friction of its own the other levels say nothing, whatever the draws know of it.
+    values = model.chain.friction.as_others_say(model.values(u), level)
     eta = np.concatenate(
         [fold.linear_draws(model.values(u[i : i + size]), rng) for i in range(0, len(u), size)]
     )

@@ -82,3 +82,22 @@ def test_friction_of_each_level_is_its_own_and_between_them_interpolated() -> No
     values = dict(zip(friction.names, (np.full((1, 1), K) for K in (0.1, 0.2, 0.4)), strict=True))
     found = friction.apply(state, values).coulomb
     np.testing.assert_allclose(found, [[0.1, 0.108, 0.3, 0.1, 0.4]])
+
+
+def test_a_level_s_friction_as_its_neighbours_say() -> None:
+    """Between two levels along a straight line, beyond them as at the nearest."""
+    made = model(friction="coulomb", friction_by_pressure=True)
+    assert made.chain is not None and made.setting is not None
+    declared = made.chain.friction
+    levels = made.setting.levels
+    values = {name: np.full((2, 1), 0.02 * (i + 1) ** 2) for i, name in enumerate(declared.names)}
+    factors = 0.02 * (np.arange(len(levels)) + 1.0) ** 2
+    for level, name in enumerate(declared.names):
+        said = declared.as_others_say(values, level)
+        others = np.arange(len(levels)) != level
+        expected = np.interp(levels[level], levels[others], factors[others])
+        assert said[name] == pytest.approx(np.full((2, 1), expected))
+        assert all(said[n] is values[n] for n in declared.names if n != name)
+    common = model(friction="coulomb").chain
+    assert common is not None
+    assert common.friction.as_others_say(values, 0) == values

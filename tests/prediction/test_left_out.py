@@ -77,6 +77,16 @@ def test_a_law_that_is_wrong_in_pressure_is_told_though_every_level_fits():
     assert (np.sign(inner["bias_N"]) == (-1.0) ** np.arange(1, 6)).all()
 
 
+def test_friction_of_a_level_s_own_is_foreseen_from_its_neighbours(sound):
+    """As predictions there take it: neither unknown, nor what the readings left out have said of it."""
+    simulation = sound.specimen.simulation.model_copy(update={"friction_by_pressure": True})
+    table = told(calibrate(replace(sound.specimen, simulation=simulation)))
+    inner, common = (t[~t["extrapolated"]] for t in (table, told(sound)))
+    assert abs(inner["inside90"].mean() - 0.90) < 0.05
+    assert inner["rmse_N"].to_numpy() == pytest.approx(common["rmse_N"].to_numpy(), rel=0.2)
+    assert (inner["bias_sd_N"] < 2.0 * common["bias_sd_N"]).all()
+
+
 @pytest.mark.long
 def test_rows_that_are_means_have_the_noise_of_means(sound):
     specimen, many = sound.specimen, 25
