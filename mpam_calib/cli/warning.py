@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 
@@ -11,4 +12,10 @@ def warn_unconverged(run: Path) -> None:
     from mpam_calib.posterior.stored import unconverged
 
     if unconverged(run):
-        print(f"warning: {run} did not converge: its bands may be wrong until it has", file=sys.stderr)
+        warn([f"{run} did not converge: its bands may be wrong until it has"])
+
+
+def warn(lines: Iterable[str]) -> None:
+    """Each line on standard error, marked as a warning."""
+    for line in lines:
+        print(f"warning: {line}", file=sys.stderr)

@@ -163,5 +163,15 @@ class Reach:
 
     def outside(self, pressure: Array) -> NDArray[np.bool_]:
         """Whether a pressure lies outside the recorded ones (by more than 1 %)."""
-        margin = 0.01 * self.pressures[-1]
+        margin = self._margin
         return np.asarray((pressure < self.pressures[0] - margin) | (pressure > self.pressures[-1] + margin))
+
+    def between(self, pressure: Array) -> NDArray[np.bool_]:
+        """Whether a pressure lies between the recorded ones, and near none of them (by the same measure)."""
+        apart = np.abs(pressure[:, None] - self.pressures).min(axis=1)
+        return np.asarray(~self.outside(pressure) & (apart > self._margin))
+
+    @property
+    def _margin(self) -> float:
+        """Pressure (Pa) by which a gauge's reading may miss its level."""
+        return 0.01 * float(self.pressures[-1])

@@ -90,7 +90,7 @@ def between_levels(view: CalibrationView) -> Limit | None:
 
 def beyond_levels(view: CalibrationView) -> Limit | None:
     """The outer levels, predicted from the others, miss their readings."""
-    held = _held_left_out(view, extrapolated=True)
+    held = held_left_out(view.left_out, extrapolated=True)
     if held is None or not held.missed:
         return None
     sentence = (
@@ -102,11 +102,11 @@ def beyond_levels(view: CalibrationView) -> Limit | None:
 
 def held_between(view: CalibrationView) -> Held | None:
     """The inner levels' readings in the 90 % bands that the others give; None where they are few."""
-    return _held_left_out(view, extrapolated=False)
+    return held_left_out(view.left_out, extrapolated=False)
 
 
-def _held_left_out(view: CalibrationView, extrapolated: bool) -> Held | None:
-    rows = view.left_out
+def held_left_out(rows: pd.DataFrame, extrapolated: bool) -> Held | None:
+    """The inner levels, or the outer ones, of a view's ``left_out``; None where their readings are few."""
     if rows.empty:
         return None
     rows = rows[rows["extrapolated"].astype(bool) == extrapolated]

@@ -94,10 +94,11 @@ def calibrate_to_folder(
     from mpam_calib.run.view import view_of
 
     bands = calibration.bands()
-    page = calibration_page(view_of(calibration, bands))
+    view = view_of(calibration, bands)
+    page = calibration_page(view)
     folder.clear()
     page.write(run / REPORT)
-    folder.write(calibration, bands)
+    folder.write(calibration, bands, view.left_out)
     if calibration.converged:
         folder.checkpoint.clear()
     return Outcome(calibration.converged, kept=False)

@@ -16,6 +16,7 @@ from mpam_calib.calibration import Calibration
 from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.posterior.chains.checkpoint import Checkpoint, sweep
 from mpam_calib.posterior.stored import POSTERIOR, RUN_FILE, readable, write_draws
+from mpam_calib.run.asked import LEFT_OUT, kept_left_out
 from mpam_calib.run.files import CHECKPOINT, write_csv, write_json
 from mpam_calib.run.kept import written_over
 
@@ -84,8 +85,11 @@ class RunFolder:
             (self.path / name).unlink(missing_ok=True)
         sweep(self.path)
 
-    def write(self, calibration: Calibration, bands: pd.DataFrame) -> None:
-        """Write everything but the report; ``run.json`` comes last, as the mark of a finished run."""
+    def write(self, calibration: Calibration, bands: pd.DataFrame, left_out: pd.DataFrame) -> None:
+        """Write everything but the report; ``run.json`` comes last, as the mark of a finished run.
+
+        ``left_out`` as in the report's view.
+        """
         write_csv(calibration.summary, self.path / "summary.csv")
         write_csv(bands, self.path / "bands.csv")
         write_draws(
@@ -95,7 +99,8 @@ class RunFolder:
             calibration.sampling.log_prob,
             self.digest,
         )
-        write_json(describe(calibration, self.digest), self.path / RUN_FILE)
+        content = describe(calibration, self.digest) | {LEFT_OUT: kept_left_out(left_out)}
+        write_json(content, self.path / RUN_FILE)
 
 
 def describe(calibration: Calibration, digest: str) -> dict[str, Any]:

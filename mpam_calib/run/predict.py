@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from mpam_calib.calibration import predict
 from mpam_calib.errors import InputError
 from mpam_calib.posterior.stored import load_run
+from mpam_calib.run.asked import remarks
 from mpam_calib.run.files import demand_writable, write_csv
 from mpam_calib.specimen.plausibility import HIGHEST_LEVEL_KPA
 from mpam_calib.units import KPA
@@ -34,7 +36,7 @@ def parse_pressures(text: str) -> Array:
     >>> parse_pressures("100:250:100").tolist()
     [100.0, 200.0, 250.0]
     """
-    found, expected = f'"{" ".join(text.split())}"', "A:B:STEP in kPa with 0 <= A <= B and STEP > 0"
+    found, expected = f'"{" ".join(text.split())}"', "A or A:B:STEP in kPa with 0 <= A <= B and STEP > 0"
     try:
         parts = [float(part) for part in text.split(":")]
     except ValueError as error:
@@ -56,8 +58,16 @@ def parse_pressures(text: str) -> Array:
     return np.append(np.round(first + step * before, 9), last)
 
 
-def predict_to_folder(run: Path, pressures_kPa: Array | None, seed: int | None = None) -> Path:
-    """Write ``RUN/predictions.csv`` at pressures (the levels without), and return its path."""
+@dataclass(frozen=True)
+class Predicted:
+    """The table's path, and what to know before its numbers are used."""
+
+    path: Path
+    remarks: list[str]
+
+
+def predict_to_folder(run: Path, pressures_kPa: Array | None, seed: int | None = None) -> Predicted:
+    """Write ``RUN/predictions.csv`` at pressures (the levels without)."""
     stored = load_run(run)
     demand_writable(run)
     model = stored.model
@@ -66,6 +76,7 @@ def predict_to_folder(run: Path, pressures_kPa: Array | None, seed: int | None =
         if pressures_kPa is not None:
             raise InputError(OPTION, "pressures", "none: this run is of a material, not of a muscle")
         table = predict(model, stored.draws, seed)
+        found = []
     else:
         levels = np.array(model.blueprint.levels) / KPA if pressures_kPa is None else pressures_kPa
         chunks = [levels[i : i + AT_ONCE] for i in range(0, len(levels), AT_ONCE)]
@@ -74,6 +85,7 @@ def predict_to_folder(run: Path, pressures_kPa: Array | None, seed: int | None =
         table = pd.concat(parts, ignore_index=True)
         tables = [rows for _, rows in table.groupby(["quantity", "branch"], sort=False)]
         table = pd.concat(tables, ignore_index=True).drop_duplicates(ignore_index=True)
+        found = remarks(model, stored.state, levels, table)
     path = run / "predictions.csv"
     write_csv(table, path)
-    return path
+    return Predicted(path, found)

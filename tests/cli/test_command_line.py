@@ -56,7 +56,7 @@ def test_each_option_is_explained_within_a_window_of_80_columns(command: str) ->
 def test_help_of_pressure_says_what_is_meant() -> None:
     text = " ".join(run("predict", "--help").stdout.split())
     assert "--pressure A:B:STEP" in text
-    assert "kPa, B included" in text
+    assert "One pressure A, or A:B:STEP, in kPa, B included" in text
 
 
 def test_help_comes_at_once() -> None:
