@@ -13,17 +13,23 @@ from mpam_calib.posterior.material import demand_other, material_of
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.run.files import KEPT_FILE, demand_own, demand_writable
 from mpam_calib.run.folder import REPORT, RunFolder, run_digest
+from mpam_calib.run.odd import tell_odd
 from mpam_calib.run.replaced import tell_replaced
 from mpam_calib.specimen import read
+from mpam_calib.specimen.recording import Specimen
 
 
-def _told_first(run: Path, tell: Listener) -> Listener:
-    """A listener that says whose page goes once there are steps: until then data may be refused."""
+def _told_first(run: Path, specimen: Specimen, source: str | Path, tell: Listener) -> Listener:
+    """A listener that says what looks odd and whose page goes once there are steps.
+
+    Until then data may be refused, and that is told in one line.
+    """
     notes = iter([run])
 
     def listener(progress: Progress) -> None:
         if progress.steps and next(notes, None):
             tell_replaced(run, "calibration")
+            tell_odd(specimen, source)
         tell(progress)
 
     return listener
@@ -84,7 +90,7 @@ def calibrate_to_folder(
             options=options,
             material=material,
             checkpoint=folder.checkpoint,
-            listener=_told_first(run, tell),
+            listener=_told_first(run, specimen, source, tell),
         )
     figures = calibration.sampling.diagnostics
     ess = float(min(figures.ess_bulk.min(), figures.ess_tail.min()))

@@ -29,9 +29,15 @@ class Result:
     err: str
 
     @property
+    def unremarked(self) -> str:
+        """What standard error holds beside the odd lines of the data; of a refusal, all."""
+        lines = self.err.splitlines(keepends=True)
+        return self.err if self.code == 2 else "".join(x for x in lines if not x.startswith("odd: "))
+
+    @property
     def complaint(self) -> str:
         """The one line of an error; fails where there is more, or a traceback."""
-        lines = self.err.splitlines()
+        lines = self.unremarked.splitlines()
         assert len(lines) == 1, self.err
         return lines[0]
 

@@ -64,7 +64,7 @@ def test_a_command_says_so_before_it_starts(
     if command == "calibrate":
         finish(run_copy, "select", "models.csv")
         owner = "selection"
-    lines = here(command, muscle, "-o", run_copy).err.splitlines()
+    lines = here(command, muscle, "-o", run_copy).unremarked.splitlines()
     assert lines[0] == f"note: {run_copy / 'report.html'} is of a {owner}; this {own} will replace it"
     assert len(lines) == 2
 
