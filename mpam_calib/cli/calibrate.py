@@ -30,9 +30,9 @@ def calibrate(
         typer.Option("--correlated-noise/--no-correlated-noise", help="Allow for noise that lasts."),
     ] = True,
 ) -> None:
-    """Draw the posterior of a specimen's simulation.
+    """Find the simulation's parameters, with bands, from a specimen's data.
 
-    Writes draws, summary, bands and a report to RUN.
+    Writes a report, the parameters, bands on what the muscle does and the draws behind them to RUN.
 
     The same command on an unfinished RUN resumes it and keeps a finished one; other data, another
     model or seed replaces it. Exit code 3: not converged within the budget; a larger one resumes.

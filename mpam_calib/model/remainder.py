@@ -33,7 +33,8 @@ def remainder_parameters(setting: Setting, strokes: bool) -> tuple[Parameter, ..
     Either may be e⁴ times as large, or as small: where the physics is right nothing widens the bands.
     """
     scale = setting.force_scale
-    found = [Parameter(SMOOTH, LogNormal(0.003 * scale, 2.0), "what the simulation leaves out, one sigma")]
+    meaning = "assumed scale of what the simulation may leave out, not its size in these data"
+    found = [Parameter(SMOOTH, LogNormal(0.003 * scale, 2.0), meaning)]
     if strokes:
         found.append(Parameter(ROUGH, LogNormal(0.0006 * scale, 2.0), "the same, for one stroke alone"))
     return tuple(found)

@@ -71,15 +71,16 @@ def _lead(view: CalibrationView) -> list[Block]:
 def _fit_cards(view: CalibrationView) -> list[KeyNumber]:
     """What the simulation misses, and whether levels left out are foreseen, where these were assessed."""
     held = held_between(view)
-    left_out = "" if held is None else f"levels left out: {held} of readings in their 90 % band"
+    unseen = f"at a pressure level that the fit had not seen, {held} of readings fell in bands meant for 90 %"
     if math.isfinite(view.remainder):
         size, noise = (fixed(x, decimals(x)) for x in (view.remainder, view.noise))
         words = f"sensor noise: {noise} N" if math.isfinite(view.noise) else ""
-        return [KeyNumber("Simulation misses by", size, "N", words, left_out)]
+        return [KeyNumber("Simulation misses by", size, "N", words, "" if held is None else unseen)]
     if held is None:
         return []
     text = f"{100 * held.share:.0f}"
-    return [KeyNumber("Levels left out", text, "%", "of readings in their 90 % band", "should be 90 %")]
+    words = "of readings at a pressure level that the fit had not seen fell in its bands"
+    return [KeyNumber("Levels left out", text, "%", words, "should be 90 %")]
 
 
 def _band(row: pd.Series, scale: float = 1.0) -> tuple[str, str]:
@@ -248,7 +249,7 @@ def _pairs_section(view: CalibrationView) -> Section:
 
 
 def _convergence_section(view: CalibrationView) -> Section:
-    return Section("Has the sampler settled?", [Text(wording.convergence_sentences(view.convergence))])
+    return Section("Has the calculation settled?", [Text(wording.convergence_sentences(view.convergence))])
 
 
 def _identified_section(view: CalibrationView) -> Section:

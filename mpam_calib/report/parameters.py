@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from mpam_calib.report.numbers import fixed, significant, with_band
-from mpam_calib.report.trust import UNIDENTIFIED
+from mpam_calib.report.trust import UNIDENTIFIED, WIDE_BAD
 from mpam_calib.report.view import CalibrationView
 
 RIGHT = dict.fromkeys(
@@ -58,17 +58,20 @@ def learnt_table(view: CalibrationView) -> pd.DataFrame:
                 "learnt": f"{100 * max(learnt, 0.0):.0f} %",
                 "what that means": sentence
                 if isinstance(sentence, str) and sentence
-                else _sentence(learnt, q05 < 0.0 < q95),
+                else _sentence(learnt, float(q05), float(q95)),
             }
         )
     return pd.DataFrame(rows)
 
 
-def _sentence(learnt: float, either_sign: bool) -> str:
+def _sentence(learnt: float, low: float, high: float) -> str:
     if learnt < UNIDENTIFIED:
-        return "The data say nothing about it: what you see is the prior."
+        return "The data say nothing about it: what you see is what was assumed before the test."
     if learnt < 0.5:
         return "The data say a little; the prior still matters."
-    if either_sign:
+    if low < 0.0 < high:
         return "The data narrow it down, but leave its sign open."
+    # A band that is wide beside its value is no number to quote, however little was known before.
+    if high - low > WIDE_BAD * abs(high + low):
+        return "The data narrow it down; its band is wide."
     return "The data determine it."

@@ -42,11 +42,13 @@ GAUGE_SHARE: Final = 0.5
 """The gauge limits the result when it makes up this share of the band ..."""
 GAUGE_TAKEN_UP: Final = 2.0
 """... and where it would make up this many of the band, free parameters have taken up its offset."""
+NAMED, NAMED_BRIEFLY = 5, 2
+"""Parameters that a sentence names, and the verdict."""
 _RANK: dict[Level, int] = {"good": 0, "caution": 1, "bad": 2}
 
 
 def convergence(view: CalibrationView) -> Limit | None:
-    """The sampler has not settled, or ended in several separate explanations."""
+    """The calculation has not settled, or ended in several separate explanations."""
     c = view.convergence
     failed = []
     if not c.rhat_max <= RHAT_LIMIT:
@@ -60,9 +62,10 @@ def convergence(view: CalibrationView) -> Limit | None:
     if failed or not c.converged:
         why = "; ".join(failed) or "it was stopped by its step budget"
         sentence = (
-            f"The sampler has not settled: {why}. Run it longer (--max-steps) before using any number here."
+            f"The calculation has not settled: {why}. Run it longer (--max-steps) before using any number "
+            "here."
         )
-        return Limit("bad", sentence, "the sampler has not settled")
+        return Limit("bad", sentence, "the calculation has not settled")
     if c.modes > 1:
         sentence = f"The data allow {c.modes} separate explanations; the bands mix them."
         return Limit("caution", sentence, f"there are {c.modes} separate explanations")
@@ -129,16 +132,16 @@ def gauge(view: CalibrationView) -> Limit | None:
     half = float(row["q95"] - row["q05"]) / 2.0
     if newtons < GAUGE_SHARE * half or half <= 0:
         return None
+    worth = f"± {significant(newtons, 2)} N (90 %, by pressure_bias_sd_kPa = {view.pressure_bias_sd_kPa:g})"
     if newtons > GAUGE_TAKEN_UP * half:
         sentence = (
-            "The bands hold for pressures as this gauge reads them, because the free parameters take up its "
-            f"offset. By another gauge, ± {view.pressure_bias_sd_kPa:g} kPa (one sigma) more is worth "
-            f"± {significant(newtons, 2)} N (90 %)."
+            "The bands hold for pressures as this gauge reads them: whatever constant offset it has, the fit "
+            f"has made up for it. By a gauge that has none, forces may differ by {worth} more."
         )
         return Limit("good", sentence, "the bands hold for pressures as this gauge reads them")
     sentence = (
-        f"The pressure gauge sets the width of the band: ± {view.pressure_bias_sd_kPa:g} kPa (one sigma) "
-        f"alone is worth ± {significant(newtons, 2)} N (90 %). More loops do not help; a better gauge does."
+        f"The pressure gauge sets the width of the band: its offset alone is worth {worth}. More loops do "
+        "not help; a better gauge does."
     )
     return Limit("good", sentence, "the pressure gauge sets the width of the band")
 
@@ -148,10 +151,23 @@ def identification(view: CalibrationView) -> Limit | None:
     names = unidentified_names(view)
     if not names:
         return None
-    listed = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
     them = "it" if len(names) == 1 else "them"
-    sentence = f"Do not quote {listed} alone: the data say nothing about {them} beyond the prior."
-    return Limit("good", sentence, f"the data say nothing about {listed}")
+    sentence = (
+        f"Do not quote {_in_words(view, names, NAMED)} alone: the data say nothing about {them}, and what "
+        "you see is what was assumed before the test."
+    )
+    return Limit("good", sentence, f"the data say nothing about {_in_words(view, names, NAMED_BRIEFLY)}")
+
+
+def _in_words(view: CalibrationView, names: list[str], most: int) -> str:
+    """Some parameters by what they are, their ids in brackets."""
+    said = []
+    for name in names[:most]:
+        meaning = view.meanings.get(name, "")
+        article = "" if meaning.split(" ")[0] in ("the", "how", "what") else "the "
+        said.append(f"{article}{meaning} ({name})" if meaning else name)
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(said)}{more}"
 
 
 def source(view: CalibrationView) -> Limit | None:
@@ -183,7 +199,7 @@ class Check:
 
 # To lie within noise that holds what the simulation misses is no good news.
 CHECKS: tuple[Check, ...] = (
-    Check(convergence, "the sampler has settled"),
+    Check(convergence, "the calculation has settled"),
     Check(
         along_stroke,
         "the readings lie in their bands",
@@ -241,7 +257,7 @@ def assess(view: CalibrationView) -> Verdict:
     if asked := look_first(view, level):
         reasons.insert(1, asked)
     if in_order:
-        reasons.append(f"In order: {'; '.join(in_order)}.")
+        reasons.append(f"What is fine: {'; '.join(in_order)}.")
     return Verdict(_sentence(level, limits), level, reasons)
 
 

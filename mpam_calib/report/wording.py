@@ -1,4 +1,4 @@
-"""Sentences of the reports: what was simulated, what was left aside, whether the sampler settled."""
+"""Sentences of the reports: what was simulated, what was left aside, whether the calculation settled."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def left_aside(specimen: Specimen, what: str) -> list[str]:
 
 
 def convergence_sentences(c: Convergence) -> str:
-    """Whether the sampler settled, for a reader who has never run one; paragraphs."""
+    """Whether the calculation settled, for a reader who has never run one; paragraphs."""
     ess = c.ess_min
     settled = (
         "Yes."

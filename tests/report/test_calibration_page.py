@@ -56,7 +56,7 @@ def test_every_section_is_there(html: str) -> None:
         "Blocked force and free contraction",
         "Parameters",
         "Which parameters trade off",
-        "Has the sampler settled?",
+        "Has the calculation settled?",
         "What the data could not identify",
         "Data and settings",
     ]
@@ -84,6 +84,24 @@ def test_unidentified_parameters_come_first(view: CalibrationView) -> None:
     assert table["parameter"].iloc[0] == "P_DB_kPa"
     assert "nothing" in table["what that means"].iloc[0]
     assert table["what that means"].iloc[-1] == "The data determine it."
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [
+        (0.005, 0.142, "The data narrow it down; its band is wide."),
+        (-0.1, 0.2, "The data narrow it down, but leave its sign open."),
+        (0.06, 0.08, "The data determine it."),
+        (-0.08, -0.06, "The data determine it."),
+    ],
+)
+def test_a_band_that_is_wide_beside_its_value_is_not_determined(
+    view: CalibrationView, low: float, high: float, words: str
+) -> None:
+    summary = view.summary.copy()
+    summary.loc[summary["parameter"] == "K_f", ["q05", "q95"]] = low, high
+    table = learnt_table(replace(view, summary=summary)).set_index("parameter")
+    assert table.loc["K_f", "what that means"] == words
 
 
 def test_page_is_small_fast_and_the_same_each_time(view: CalibrationView, html: str) -> None:
@@ -116,7 +134,7 @@ def test_nasty_names_are_harmless() -> None:
 def test_an_unsettled_run_says_so_on_top_and_below(view: CalibrationView) -> None:
     late = replace(view, convergence=replace(view.convergence, converged=False, rhat_max=1.08))
     words = words_of(calibration_page(late).render())
-    assert "No, do not rely on these numbers: the sampler has not settled." in words
+    assert "No, do not rely on these numbers: the calculation has not settled." in words
     assert "No: treat every number on this page as provisional." in words
 
 
@@ -186,6 +204,7 @@ def test_levels_predicted_from_the_others(view: CalibrationView) -> None:
         assert heading in words and "Each level predicted from the others" in words
         assert "86 %" in words and "50 (beyond the others)" in words and "1.5 ± 0.2" in words
         assert "2 of 5 levels are looked at" in words
+        assert "at a pressure level that the fit had not seen" in words
     every = replace(view, left_out=pd.concat([left_out] * 3)[:5])
     assert "levels are looked at" not in words_of(calibration_page(every).render())
 

@@ -30,7 +30,7 @@ def test_a_sound_calibration_is_trusted_and_its_limit_named(sound: CalibrationVi
     assert verdict.level == "good"
     assert verdict.sentence.startswith("Yes")
     assert "P_DB_kPa" in verdict.sentence
-    assert "the sampler has settled" in verdict.reasons[-1]
+    assert verdict.reasons[-1].startswith("What is fine: the calculation has settled; ")
 
 
 def test_nothing_to_remark(sound: CalibrationView) -> None:
@@ -56,7 +56,7 @@ def test_an_unsettled_sampler_is_bad(sound: CalibrationView, changes: dict[str, 
     assert verdict.level == "bad"
     assert verdict.sentence.startswith("No")
     assert words in verdict.reasons[0]
-    assert "the sampler has settled" not in verdict.reasons[-1]
+    assert "the calculation has settled" not in verdict.reasons[-1]
 
 
 def test_the_limits_themselves_pass(sound: CalibrationView) -> None:
@@ -148,8 +148,26 @@ def test_a_gauge_that_makes_up_the_band_is_named(sound: CalibrationView) -> None
     assert "± 14 N" in limit.sentence
     assert limit.level == "good"
     assert "as this gauge reads them" in limit.sentence  # the band is far narrower: it cannot be what sets it
+    # One measure of uncertainty in a sentence, and the declaration by its name.
+    assert "90 %, by pressure_bias_sd_kPa = 22.5" in limit.sentence and "sigma" not in limit.sentence
     limit = trust.gauge(replace(sound, pressure_bias_sd_kPa=5.0))
     assert limit is not None and "sets the width" in limit.sentence
+
+
+def test_what_the_data_do_not_tell_is_named_in_words(sound: CalibrationView) -> None:
+    said = replace(sound, meanings={"P_DB_kPa": "pressure that does no work yet"})
+    limit = trust.identification(said)
+    assert limit is not None
+    assert limit.sentence == (
+        "Do not quote the pressure that does no work yet (P_DB_kPa) alone: the data say nothing about it, "
+        "and what you see is what was assumed before the test."
+    )
+    assert limit.brief == "the data say nothing about the pressure that does no work yet (P_DB_kPa)"
+    several = replace(said, unidentified=sound.unidentified.assign(contraction=0.0))
+    limit = trust.identification(several)
+    count = len(sound.unidentified)
+    assert limit is not None and limit.brief.endswith(f" and {count - 2} more")
+    assert f" and {count - 5} more alone: the data say nothing about them" in limit.sentence
 
 
 def test_reconstructed_data_are_a_caution(sound: CalibrationView) -> None:
@@ -163,7 +181,7 @@ def test_the_worst_limit_comes_first(sound: CalibrationView) -> None:
     view = replace(settled(sound, converged=False), remainder=3.0, provenance="reconstructed")
     verdict = trust.assess(view)
     assert verdict.level == "bad"
-    assert verdict.reasons[0].startswith("The sampler has not settled")
+    assert verdict.reasons[0].startswith("The calculation has not settled")
     assert any("wrong by about 3.0 N" in reason for reason in verdict.reasons)
 
 
