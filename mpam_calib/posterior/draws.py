@@ -53,10 +53,21 @@ class Draws:
         return Draws(self.u[keep], {k: v[keep] for k, v in self.values.items()}, self.eta[keep], 1)
 
 
+def spread_over(steps: int, walkers: int, kept: int) -> NDArray[np.int64]:
+    """Which of an ensemble's draws (steps × walkers, step by step) are kept, at most as many as there are.
+
+    The walkers take turns while the steps go on evenly, so that each is seen as far apart in time as can be.
+    Evenly spaced draws could be those of a few walkers, and remember for as long as these do.
+    """
+    count = min(kept, steps * walkers)
+    turn = np.arange(count)
+    return turn * steps // count * walkers + turn % walkers
+
+
 def keep_draws(target: Collapsed, sampling: Sampling, seed: int, kept: int | None = KEPT) -> Draws:
-    """Evenly spaced draws of every ensemble (None: all), with η drawn from its exact conditional for each."""
+    """Draws of every ensemble (None: all), with η drawn from its exact conditional for each."""
     E, T, W, d = sampling.chain.shape
-    keep = np.unique(np.linspace(0, T * W - 1, kept or T * W).astype(np.int64))
+    keep = spread_over(T, W, kept or T * W)
     u = sampling.chain.reshape(E, T * W, d)[:, keep].reshape(-1, d)
     size = batch_size(target)
     tasks = [(u[i : i + size], [seed, 1, i]) for i in range(0, len(u), size)]

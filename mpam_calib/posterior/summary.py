@@ -30,11 +30,12 @@ def summarise(listed: list[Reported], names: tuple[str, ...], sampling: Sampling
 
     A sampled parameter's R-hat and ESS are those of all its draws, the ESS at most the number of kept ones,
     which its figures are computed from; what is computed from kept draws itself (coefficients, z) is assessed
-    on these, each ensemble one chain, and never credited with more than the worst sampled parameter allows
-    R-hat to hide.
+    on these, each ensemble one chain. Its ESS is at most that of the worst sampled parameter: among kept
+    draws the walkers' follow each other, which hides how long each remembers.
     """
     chains = sampling.chain.shape[0]
     figures = sampling.diagnostics
+    worst = [float(np.min(ess, initial=np.inf)) for ess in (figures.ess_bulk, figures.ess_tail)]
     rows = []
     for item in listed:
         x = item.draws
@@ -47,8 +48,8 @@ def summarise(listed: list[Reported], names: tuple[str, ...], sampling: Sampling
             flat = np.ptp(split) == 0.0
             state = (
                 1.0 if flat else rhat(split),
-                float(x.size) if flat else ess_bulk(split),
-                float(x.size) if flat else ess_tail(split),
+                float(x.size) if flat else min(ess_bulk(split), worst[0]),
+                float(x.size) if flat else min(ess_tail(split), worst[1]),
             )
         q05, q50, q95 = np.quantile(x, [0.05, 0.5, 0.95])
         rows.append([item.name, item.unit, x.mean(), x.std(ddof=1), q05, q50, q95, item.prior_sd, *state])

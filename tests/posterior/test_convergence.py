@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from mpam_calib.posterior.chains.convergence import RHAT_LIMIT, diagnose_chains
+from mpam_calib.posterior.chains.sampling import Sampling
+from mpam_calib.posterior.draws import Reported, spread_over
+from mpam_calib.posterior.summary import summarise
 
 SHAPE = (4, 1500, 16)
 
@@ -115,3 +118,43 @@ def test_a_stuck_walker_does_not_hide_the_others_tau():
     assert 0.0 < held < free
     x[:] = np.arange(4.0)[:, None, None, None]
     assert not diagnose_chains(x).converged
+
+
+@pytest.mark.parametrize(
+    ("steps", "walkers"), [(1000, 48), (1500, 16), (160, 48), (200, 128), (1000, 32), (5, 300), (7, 8)]
+)
+def test_kept_draws_say_as_much_as_so_many_can(steps: int, walkers: int) -> None:
+    """AR(1) of τ = 39 for each walker: the variance of a mean over kept draws, against that over all of them.
+
+    So many independent ones beside it: 1/ESS is at most 1/(ESS of all) + 1/(kept).
+    """
+    rho, kept = 0.95, min(1000, steps * walkers)
+
+    def ess(index: np.ndarray) -> float:
+        time, walker = np.divmod(index, walkers)
+        apart = np.abs(np.subtract.outer(time, time))
+        together = np.equal.outer(walker, walker)
+        return float(len(index) ** 2 / np.sum(rho**apart * together))
+
+    found = spread_over(steps, walkers, 1000)
+    assert len(np.unique(found)) == len(found) == kept
+    assert found.min() >= 0 and found.max() < steps * walkers
+    own = rho ** np.abs(np.subtract.outer(np.arange(steps), np.arange(steps)))
+    every = steps**2 * walkers / float(own.sum())
+    assert 1.0 / ess(found) <= 1.0 / every + 1.0 / kept
+
+
+def test_what_follows_from_kept_draws_has_no_more_of_them_than_what_it_follows_from() -> None:
+    """Kept draws of many walkers look as if nothing lasted; a sum of the parameter is as slow as it is."""
+    chain = ar1(0.95, 3)
+    figures = diagnose_chains(chain)
+    kept = chain[..., 0].reshape(4, -1)[:, spread_over(1500, 16, 1000)]
+    listed = [
+        Reported("K_f", "", kept.ravel(), 1.0, True, "factor"),
+        Reported("E_1", "Pa", 3.0 * kept.ravel() + 1.0, 1.0, False, "modulus"),
+    ]
+    sampling = Sampling(chain, chain[..., 0], figures, [], 0.3, [0.3])
+    table = summarise(listed, ("K_f",), sampling).set_index("parameter")
+    for figure in ("ess_bulk", "ess_tail"):
+        assert table.loc["E_1", figure] <= figures.ess_bulk[0]
+    assert table.loc["E_1", "ess_bulk"] == pytest.approx(table.loc["K_f", "ess_bulk"], rel=0.05)
