@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mpam_calib.physics.kinematics import SHAPES, Rest
 from mpam_calib.physics.statics import gas_force, thickness_force
 from mpam_calib.specimen.declaration import Geometry
+from mpam_calib.specimen.load_cell import odd_readings
 from mpam_calib.specimen.motion import run_ids
 from mpam_calib.specimen.plausibility import longest_contraction
 from mpam_calib.specimen.recording import Floats, Loops, Specimen
@@ -55,6 +56,7 @@ def oddities(specimen: Specimen) -> list[str]:
         remarks += _odd_speeds(loops)
         remarks += _odd_cycles(loops)
         remarks += _odd_levels(loops, specimen.levels_Pa)
+        remarks += odd_readings(loops)
     if specimen.geometry is not None:
         remarks += _odd_forces(specimen) + _odd_signs(specimen)
     remarks += _odd_contractions(specimen)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from mpam_calib.criticism.data.problem import Problem
-from mpam_calib.criticism.data.saturation import along_a_ceiling, saturated
+from mpam_calib.criticism.data.saturation import along_a_ceiling
 from mpam_calib.criticism.fitting.fit import Fit, fit
 from mpam_calib.criticism.searching.candidates import candidates
 from mpam_calib.criticism.unexplained import structure
@@ -21,6 +21,7 @@ from mpam_calib.criticism.unexplained.repeat import raw_residual, repeating_rms
 from mpam_calib.criticism.unexplained.structure import structure_tests
 from mpam_calib.model.readings import Readings
 from mpam_calib.specimen import Specimen
+from mpam_calib.specimen.extremes import saturated
 from mpam_calib.specimen.recording import BlockedForce
 
 from .test_hypotheses import problem_of, specimen_of

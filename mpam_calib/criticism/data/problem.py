@@ -18,7 +18,7 @@ from scipy import linalg
 
 from mpam_calib.criticism.data.noise_level import NoiseLevel, noise_level
 from mpam_calib.criticism.data.rows import Rows, telling_points, telling_strokes
-from mpam_calib.criticism.data.saturation import along_a_ceiling, saturated
+from mpam_calib.criticism.data.saturation import along_a_ceiling
 from mpam_calib.criticism.data.static_noise import static_noise
 from mpam_calib.criticism.data.whitening import Axes, Whitening
 from mpam_calib.model.blueprint import Blueprint
@@ -29,6 +29,7 @@ from mpam_calib.posterior.likelihood.bins import LoopBins, bin_loops
 from mpam_calib.posterior.likelihood.covariance import StrokeCovariance
 from mpam_calib.posterior.likelihood.points import gather_points
 from mpam_calib.posterior.tested_moduli import moduli_of_test
+from mpam_calib.specimen.extremes import saturated
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.specimen.summary import noise_within
 

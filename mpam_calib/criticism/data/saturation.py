@@ -1,4 +1,4 @@
-"""Readings that a load cell could not show: the end of its range, and a ceiling seen through noise."""
+"""Readings that a load cell could not show: a ceiling seen through noise."""
 
 from __future__ import annotations
 
@@ -11,12 +11,6 @@ from mpam_calib.specimen.recording import LOADING, NO_BRANCH, UNLOADING, Loops
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-
-TIES, TIES_SHARE = 10, 0.005
-"""A load cell saturates where so many readings, and such a share of them, are the same extreme value ..."""
-OUTSTANDING = 8.0
-"""... and so many times as many as at the next values (a coarse converter repeats all of them)."""
-NEXT = 5
 
 CROWDED, BELOW = 2.0, 5
 """Readings about a ceiling, in those about a place next to it, of which so many are looked at."""
@@ -34,18 +28,6 @@ SLACK = 0.25
 """Readings after it, in those along it, up to which a stroke's end is along the ceiling."""
 FLAT = 1.5
 """... and times the noise's variance that it may leave."""
-
-
-def saturated(loops: Loops) -> Bools:
-    """Readings (rows,) at an end of the load cell's range that many share; the declared floor is none."""
-    values, counts = np.unique(loops.force_N[~loops.censored], return_counts=True)
-    found = np.zeros(len(loops.force_N), dtype=bool)
-    ends = ((values[-1], counts[-1], counts[-1 - NEXT : -1]), (values[0], counts[0], counts[1 : 1 + NEXT]))
-    for value, count, near in ends:
-        enough = count >= max(TIES, TIES_SHARE * len(found))
-        if enough and len(near) and count > OUTSTANDING * near.mean():
-            found |= (loops.force_N == value) & ~loops.censored
-    return found
 
 
 def along_a_ceiling(loops: Loops, noise: float) -> Bools:
