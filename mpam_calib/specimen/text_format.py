@@ -12,7 +12,7 @@ from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import Column, Csv
 from mpam_calib.specimen.misread import refuse_thousands
 from mpam_calib.specimen.tables import TEXT_COLUMNS, TableSpec
-from mpam_calib.specimen.units_row import is_units_row
+from mpam_calib.specimen.units_row import check_header_units, is_units_row
 from mpam_calib.specimen.wording import did_you_mean, listed, os_reason, quoted
 
 SAMPLE_BYTES = 1 << 17
@@ -84,6 +84,7 @@ def detect_format(
     row, delimiter = _header(lines, declared, set(wanted.values()))
     header = _split(lines[row], delimiter)
     fields = _fields(label, row + 1, header, spec, mapping, wanted)
+    check_header_units(label, row + 1, header, fields)
     body = [line for line in lines[row + 1 :] if line.strip()]
     above = row + 1
     if body:

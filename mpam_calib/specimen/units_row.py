@@ -1,7 +1,9 @@
-"""A row of units between header and data, as many testers write it: checked against the columns' own."""
+"""Units that a file states, below its header or in a mapped name: checked against the columns' own."""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -22,27 +24,62 @@ _IN: Final[dict[str, dict[str, float]]] = {
     "C": {"°c": 1.0, "c": 1.0, "degc": 1.0},
 }
 """What one unit is worth in that of a column's name, by its spelling in lower case."""
+ALIKE = 0.05
+"""A scale is a unit's within this share of it: it may hold a sensor's own gain, which is near one."""
+
+_AT_THE_END: Final = re.compile(r".*(?:\[([^\[\]()]+)\]|\(([^\[\]()]+)\)|/([^/\[\]()]+))\s*")
 
 
 def is_units_row(label: str, row: int, cells: Sequence[str], fields: Sequence[Field]) -> bool:
     """Whether the ``cells`` of a row (counted from 1) are units of all columns that are read.
 
-    Raises ``InputError`` where they are, but one is not its column's and no scale is declared for it.
+    Raises ``InputError`` where they are, but the scale declared for one is another unit's.
     """
     read = [field for field in fields if field.name not in TEXT_COLUMNS and field.position < len(cells)]
     written = {field: cells[field.position].strip().strip("[]()") for field in read}
     worth = {field: _worth(field.name, unit) for field, unit in written.items()}
     if not any(written.values()) or None in worth.values():
         return False
-    for field, factor in worth.items():
-        if factor != 1.0 and (field.scale, field.offset) == (1.0, 0.0):
-            found = f"the unit {quoted(written[field])}"
-            expected = f"{field.name.rpartition('_')[2]}, or scale = {factor:g} for it in [columns]"
-            raise InputError(label, found, expected, row, field.name)
+    for field, unit in written.items():
+        _check_scale(label, row, field, unit)
     return True
+
+
+def check_header_units(label: str, row: int, header: Sequence[str], fields: Sequence[Field]) -> None:
+    """Refuse a mapped name that ends in a unit of another scale (``Load [lbf]``, ``p/bar``).
+
+    ``row`` is the header's. What is none of the column's units is taken for a part of the name.
+    """
+    for field in fields:
+        found = _AT_THE_END.fullmatch(header[field.position])
+        if found and field.name not in TEXT_COLUMNS and header[field.position] != field.name:
+            _check_scale(label, row, field, next(filter(None, found.groups())).strip())
+
+
+def _check_scale(label: str, row: int, field: Field, unit: str) -> None:
+    """Refuse a scale that is another unit's; any that is none is a lever's, or an area's."""
+    factor, size = _worth(field.name, unit), abs(field.scale)
+    others = {worth for worth in _units(field.name).values() if worth != factor}
+    if not unit or factor is None or _alike(size, factor) or not any(_alike(size, w) for w in others):
+        return
+    found, expected = f"the unit {quoted(unit)}", field.name.rpartition("_")[2]
+    if field.scale == 1.0:
+        expected += f", or scale = {factor:g} for it in [columns]"
+    else:
+        found += f" with scale = {field.scale:g}"
+        expected = f"scale = {math.copysign(factor, field.scale):g} for it in [columns]"
+    raise InputError(label, found, expected, row, field.name)
+
+
+def _alike(size: float, worth: float) -> bool:
+    return abs(size / worth - 1.0) < ALIKE
+
+
+def _units(name: str) -> dict[str, float]:
+    """The units that a column may be in, and what they are worth in that of its name."""
+    return _IN.get(name.rpartition("_")[2], _PLAIN)
 
 
 def _worth(name: str, unit: str) -> float | None:
     """What a unit is worth in that of a column's name; None for a word that is none of its units."""
-    known = _IN.get(name.rpartition("_")[2], _PLAIN)
-    return 1.0 if not unit else known.get(unit.lower())
+    return 1.0 if not unit else _units(name).get(unit.lower())

@@ -1,0 +1,83 @@
+"""Units stated in a file, in a row of their own or in a mapped name, against the scale declared for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mpam_calib.errors import InputError
+from mpam_calib.specimen import read
+
+from .folders import DECLARATION, loops, make
+
+
+def folder(path: Path, column: int, unit: str, scale: float, divisor: float, *, in_name: str) -> Path:
+    """Loops whose column is divided by ``divisor``, with its unit in the header or in a row below it."""
+    names = ["time_s", "pressure_kPa", "displacement_mm", "force_N"]
+    usual = ["s", "kPa", "mm", "N"]
+    header, *body = loops().text().splitlines()
+    rows = [line.split(",") for line in body]
+    for cells in rows:
+        cells[column] = f"{float(cells[column]) / divisor:.9g}"
+    header_cells = header.split(",")
+    header_cells[column] = written = in_name.format(unit) if in_name else "Channel 3"
+    usual[column] = unit
+    above = [",".join(header_cells)] + ([] if in_name else [",".join(usual)])
+    text = "\n".join([*above, *map(",".join, rows)]) + "\n"
+    mapped = f'{names[column]} = {{ name = "{written}", scale = {scale} }}'
+    return make(
+        path, DECLARATION.replace("[simulation]", f"[columns.loops]\n{mapped}\n[simulation]"), loops=text
+    )
+
+
+WAYS = ["", "Channel ({})", "Channel [{}]", "Channel/{}"]
+
+
+@pytest.mark.parametrize("in_name", WAYS)
+@pytest.mark.parametrize(
+    ("column", "unit", "scale", "expected"),
+    [
+        (3, "kN", -1.0, "scale = -1000"),
+        (3, "lbf", 1.0, "N, or scale = 4.44822"),
+        (1, "psi", 100.0, "scale = 6.89476"),
+        (1, "bar", 1.0, "kPa, or scale = 100"),
+        (1, "kPa", 100.0, "scale = 1 "),
+        (0, "min", 1.0, "s, or scale = 60"),
+        (2, "in", -1.0, "scale = -25.4"),
+    ],
+)
+def test_a_unit_of_another_scale_is_refused(
+    in_name: str, column: int, unit: str, scale: float, expected: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError) as caught:
+        read(folder(tmp_path, column, unit, scale, 1.0, in_name=in_name))
+    message = str(caught.value)
+    assert f'found the unit "{unit}"' in message and f"expected {expected}" in message
+    assert f"loops.csv:{1 if in_name else 2}:" in message and "\n" not in message
+
+
+@pytest.mark.parametrize("in_name", WAYS)
+@pytest.mark.parametrize(
+    ("column", "unit", "scale"),
+    [
+        pytest.param(3, "kN", 1000.0, id="kN"),
+        pytest.param(3, "kN", -1000.0, id="turned round"),
+        pytest.param(3, "N", -1.0, id="turned round alone"),
+        pytest.param(3, "N", 1.02, id="a cell's own gain"),
+        pytest.param(3, "N", 2.0, id="a lever"),
+        pytest.param(3, "kN", 2000.0, id="a lever in kN"),
+        pytest.param(1, "bar", 100.0, id="bar"),
+        pytest.param(1, "psi", 6.895, id="psi"),
+    ],
+)
+def test_a_unit_of_its_own_scale_is_read(
+    in_name: str, column: int, unit: str, scale: float, tmp_path: Path
+) -> None:
+    specimen = read(folder(tmp_path, column, unit, scale, scale, in_name=in_name))
+    assert specimen.levels_Pa == pytest.approx([5e4, 1e5, 1.5e5])
+
+
+@pytest.mark.parametrize("name", ["Channel (left)", "Channel/2", "Channel (kN) raw", "kN"])
+def test_what_is_no_unit_is_a_name(name: str, tmp_path: Path) -> None:
+    read(folder(tmp_path, 3, "", 1.0, 1.0, in_name=name))
