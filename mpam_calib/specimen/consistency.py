@@ -9,13 +9,17 @@ from typing import Any
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import E_REL_SD, Declaration, Simulation
+from mpam_calib.specimen.recording import Floats
 from mpam_calib.specimen.toml_source import TomlSource
 from mpam_calib.specimen.validation import fault
+from mpam_calib.units import KPA
 
 CONTRACTS_DEG = math.degrees(math.asin(1.0 / math.sqrt(3.0)))
 """Braid angle from the hoop direction above which a muscle contracts under pressure."""
 LEAST_LEVELS = {"linear": 2, "exponential": 3, "exponential_each": 3}
 """Pressure levels that a law needs: two make a line; three tell an exponential from one."""
+UNITS_OF_LESS = (1.0, "MPa", 1000), (10.0, "bar", 100)
+"""Below so many kPa no bladder is inflated, but muscles are at as many of these units (with their scale)."""
 
 
 def normalised_simulation(source: TomlSource, declaration: Declaration) -> Simulation:
@@ -115,13 +119,26 @@ def _as_in_run(source: TomlSource, simulation: Simulation) -> Simulation:
     return simulation.model_copy(update=own)
 
 
-def check_levels(source: TomlSource, simulation: Simulation, levels: int) -> None:
-    """Refuse a pressure law that the number of levels cannot carry."""
+def check_levels(
+    source: TomlSource, simulation: Simulation, levels_Pa: Floats, *, by_setpoint: bool = False
+) -> None:
+    """Refuse a pressure law that the number of levels (Pa), perhaps told ``by_setpoint``, cannot carry."""
     needed = LEAST_LEVELS.get(simulation.law, 1)
+    levels = len(levels_Pa)
     if simulation.moduli == "loops" and levels < needed:
-        found = f'law "{simulation.law}" with {levels} pressure level{"s" if levels > 1 else ""}'
+        which = "s" if levels > 1 else _one_level(levels_Pa[0] / KPA, by_setpoint)
+        found = f'law "{simulation.law}" with {levels} pressure level{which}'
         expected = f'at least {needed} levels, or law = "constant"'
         raise fault(source, ["simulation", "law"], found, expected)
+
+
+def _one_level(kilopascals: float, by_setpoint: bool) -> str:
+    """Which it is, and what may have made one of several."""
+    named = f" ({kilopascals:.3g} kPa"
+    for highest, unit, scale in UNITS_OF_LESS:
+        if kilopascals < highest:
+            return f"{named}: {unit}? scale = {scale} in [columns])"
+    return f"{named}, by setpoint_kPa alone: is it what was set?)" if by_setpoint else f"{named})"
 
 
 def least_parameters(simulation: Simulation, levels: int) -> int:

@@ -46,6 +46,7 @@ class LoopsRead:
     levels_Pa: Floats
     rows: tuple[int, ...]
     notes: tuple[str, ...]
+    by_setpoint: bool = False
 
 
 def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | None) -> LoopsRead:
@@ -124,7 +125,7 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
         unclear=unclear if unclear.any() else None,
         temperature_C=rows["temperature_C"].to_numpy() if "temperature_C" in everywhere else None,
     )
-    return LoopsRead(loops, levels_Pa, tuple(counts), tuple(notes))
+    return LoopsRead(loops, levels_Pa, tuple(counts), tuple(notes), "setpoint_kPa" in everywhere)
 
 
 def one_after_the_other(times: Sequence[Floats]) -> tuple[Floats, Floats]:

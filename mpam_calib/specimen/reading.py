@@ -71,7 +71,6 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
     if muscle_rows:
         first = next(file for file in files if file.kind != "tensile")
         check_rows(first.label, muscle_rows, least_parameters(simulation, len(levels_Pa)))
-        check_levels(source, simulation, len(levels_Pa))
         muscle = (
             None if loops is None else loops.loops,
             None if force_map is None else force_map.force_map,
@@ -79,6 +78,7 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
         )
         flags = [part.censored for part in muscle if part is not None]
         _check_pulls(first.label, levels_Pa, flags)
+        check_levels(source, simulation, levels_Pa, by_setpoint=loops is not None and loops.by_setpoint)
     return Specimen(
         name=declaration.specimen.name,
         bladder_material=declaration.specimen.bladder_material,
@@ -147,7 +147,8 @@ def _common_levels(
 def _check_pulls(label: str, levels_Pa: Floats, censored: list[Bools]) -> None:
     """Refuse data without a pressure, or without a force."""
     if levels_Pa[-1] <= 0.0:
-        found = f"no pressure level above {levels_Pa[-1] / KPA:g} kPa (flipped sign?)"
+        guess = "flipped sign?" if levels_Pa[-1] < 0.0 else "a gauge that is not connected?"
+        found = f"no pressure level above {levels_Pa[-1] / KPA:g} kPa ({guess})"
         raise InputError(label, found, "gauge pressures above 0", None, "pressure_kPa")
     if censored and all(flags.all() for flags in censored):
         found = "every row slack (at or below the floor, or censored)"

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mpam_calib.errors import InputError
 from mpam_calib.specimen import Specimen, read
 
 from .folders import HEADER, Recording, loops, make
@@ -71,3 +72,25 @@ def test_a_ramp_between_two_setpoints_read_back_is_no_level(tmp_path: Path, size
         setpoint[change - 20 : change + 1] = np.linspace(commanded[change], commanded[change + 1], 21)
     specimen = with_setpoints(tmp_path, recording, setpoint + flicker)
     assert specimen.levels_Pa == pytest.approx([50e3, 100e3, 150e3], abs=100.0)
+
+
+@pytest.mark.parametrize(
+    ("factor", "setpoint", "said"),
+    [
+        pytest.param(1e-3, "", r"1 pressure level \(0.1 kPa: MPa\? scale = 1000 in", id="megapascals"),
+        pytest.param(0.0, "", r"found no pressure level above 0 kPa \(a gauge that is not", id="nothing"),
+        pytest.param(-0.01, "", r"no pressure level above -0.5 kPa \(flipped sign\?\)", id="a sign"),
+        pytest.param(1.0, "100", r"level \(100 kPa, by setpoint_kPa alone: is it what was set\?\)", id="set"),
+    ],
+)
+def test_one_level_is_named_where_the_law_needs_more(
+    factor: float, setpoint: str, said: str, tmp_path: Path
+) -> None:
+    header, *body = loops(levels=(50.0, 100.0, 150.0)).text().splitlines()
+    rows = [line.split(",") for line in body]
+    for cells in rows:
+        cells[1] = f"{factor * float(cells[1]):.6g}"
+        cells += [setpoint] * bool(setpoint)
+    header += ",setpoint_kPa" * bool(setpoint)
+    with pytest.raises(InputError, match=said):
+        read(make(tmp_path, loops="\n".join([header, *map(",".join, rows)]) + "\n"))
