@@ -14,6 +14,7 @@ from mpam_calib.specimen.load_cell import odd_readings
 from mpam_calib.specimen.motion import run_ids
 from mpam_calib.specimen.plausibility import longest_contraction
 from mpam_calib.specimen.recording import Floats, Loops, Specimen
+from mpam_calib.specimen.repeats import repeated_rows
 from mpam_calib.specimen.summary import BRANCH_NAMES, sampling_rates, stroke_speeds
 from mpam_calib.units import KPA, MINUTE, MM
 
@@ -57,6 +58,8 @@ def oddities(specimen: Specimen) -> list[str]:
         remarks += _odd_cycles(loops)
         remarks += _odd_levels(loops, specimen.levels_Pa)
         remarks += odd_readings(loops)
+    if specimen.force_map is not None:
+        remarks += repeated_rows(specimen.force_map)
     if specimen.geometry is not None:
         remarks += _odd_forces(specimen) + _odd_signs(specimen)
     remarks += _odd_contractions(specimen)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import Column, Csv, Declaration, FileKind
+from mpam_calib.specimen.repeats import same_content
 from mpam_calib.specimen.tables import TABLES, TableSpec
 from mpam_calib.specimen.text_format import TextFormat, detect_format
 from mpam_calib.specimen.toml_source import TomlSource
@@ -84,7 +85,17 @@ def data_files(source: TomlSource, declaration: Declaration) -> list[DataFile]:
                 raise InputError(path, "a folder", f"the {kind} data as a CSV file")
             mapping = declaration.columns.of(kind)
             found[path.resolve()] = DataFile(kind, name, path, str(path), declaration.csv, mapping)
+        _refuse_the_same(source, kind, [file for file in found.values() if file.kind == kind])
     return list(found.values())
+
+
+def _refuse_the_same(source: TomlSource, kind: FileKind, files: Sequence[DataFile]) -> None:
+    """Refuse one recording under two names."""
+    if twice := same_content(file.path for file in files):
+        first, second = (quoted(next(file.name for file in files if file.path == path)) for path in twice)
+        raise fault(
+            source, ["files", kind], f"the same content in {first} and {second}", "every reading once"
+        )
 
 
 def digest(tables: dict[str, Any], files: Sequence[Path]) -> str:
