@@ -57,7 +57,7 @@ def oddities(specimen: Specimen) -> list[str]:
         remarks += _odd_speeds(loops)
         remarks += _odd_cycles(loops)
         remarks += _odd_levels(loops, specimen.levels_Pa)
-        remarks += odd_readings(loops)
+        remarks += odd_readings(loops, specimen.levels_Pa)
     if specimen.force_map is not None:
         remarks += repeated_rows(specimen.force_map)
     if specimen.geometry is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -70,3 +72,83 @@ def test_loops_without_a_force_above_the_floor_have_no_limit(tmp_path: Path) -> 
     assert specimen.loops is not None and specimen.loops.censored.all()
     assert not saturated(specimen.loops).any()
     assert "readings are exactly" not in " ".join(oddities(specimen))
+
+
+def to_free_contraction(levels: tuple[float, ...] = (50.0, 100.0, 150.0, 200.0), dwell: int = 0) -> Recording:
+    """Loops that end where the muscle pulls with nothing."""
+    made = loops(levels, dwell=dwell)
+    free = 5.0 + 0.05 * made.pressure
+    force = 0.3 * made.pressure * (1.0 - made.displacement / free) * (1.0 + 0.05 * made.branch)
+    return replace(made, force=force)
+
+
+ZERO = "the load cell zeroed"
+
+
+@pytest.mark.parametrize(
+    ("by", "said"),
+    [
+        pytest.param({}, "", id="zeroed"),
+        pytest.param(
+            dict.fromkeys((50.0, 100.0, 150.0, 200.0), 10.0), "at each of 4 levels; was the", id="all"
+        ),
+        pytest.param(dict.fromkeys((50.0, 100.0, 150.0, 200.0), 1.0), "", id="all by little"),
+        pytest.param({150.0: 10.0}, "smallest force at 150 kPa is 10.", id="one"),
+        pytest.param({100.0: -10.0}, "smallest force at 100 kPa is -9.", id="one below"),
+        pytest.param({150.0: 1.0}, "", id="one by little"),
+        pytest.param({200.0: 10.0}, "", id="the last, which may end early"),
+    ],
+)
+def test_a_zero_that_is_off(by: dict[float, float], said: str, tmp_path: Path) -> None:
+    made = to_free_contraction()
+    off = np.array([by.get(float(level), 0.0) for level in made.pressure])
+    found = remarks(tmp_path, made, noisy(made.force) + off)
+    assert (ZERO in found) == bool(said)
+    assert said in found
+
+
+@pytest.mark.parametrize("early", [{}, {100.0: 0.7}, {150.0: 0.8}, {50.0: 0.7, 200.0: 0.6}])
+@pytest.mark.parametrize("share", [0.6, 0.9, 1.0])
+def test_strokes_that_end_early_have_zeroed_cells(
+    early: dict[float, float], share: float, tmp_path: Path
+) -> None:
+    """All at a share of their free contraction, or a level or two before the others."""
+    made = to_free_contraction()
+    shares = share * np.array([early.get(float(level), 1.0) for level in made.pressure])
+    x = made.displacement * shares
+    force = 0.3 * made.pressure * (1.0 - x / (5.0 + 0.05 * made.pressure)) * (1.0 + 0.05 * made.branch)
+    assert ZERO not in remarks(tmp_path, replace(made, displacement=x), noisy(force))
+
+
+def test_a_declared_floor_is_no_zero_that_is_off(tmp_path: Path) -> None:
+    made = to_free_contraction()
+    assert ZERO not in remarks(tmp_path, made, np.maximum(noisy(made.force), 10.0), FLOOR)
+
+
+def hung(force: Array) -> Array:
+    out = force.copy()
+    out[30:70] = out[30]
+    return out
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        pytest.param(hung, True, id="hung"),
+        pytest.param(lambda f: f, False, id="sound"),
+        pytest.param(lambda f: np.maximum(np.round(f), 12.0), False, id="slack on a coarse converter"),
+        pytest.param(lambda f: 5.0 * np.round(f / 5.0), False, id="coarse converter"),
+        pytest.param(lambda f: np.repeat(f[::12], 12)[: len(f)], False, id="a slow logger"),
+        pytest.param(lambda f: np.minimum(f, 20.0), False, id="limit"),
+    ],
+)
+def test_a_force_that_stands_still_while_the_muscle_moves(
+    change: Callable[[Array], Array], said: bool, tmp_path: Path
+) -> None:
+    made = to_free_contraction(dwell=40)
+    # A cell without noise repeats its force at rest, too.
+    for i, sound in enumerate((made.force, noisy(made.force))):
+        found = remarks(tmp_path / str(i), made, change(sound))
+        assert ("did the load cell or its logger hang?" in found) == said
+        if said:
+            assert f"loops: the force stands at {sound[30]:.5g} N for 40 readings from 3 s" in found
