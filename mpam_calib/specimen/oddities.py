@@ -12,6 +12,7 @@ from mpam_calib.physics.statics import gas_force, thickness_force
 from mpam_calib.specimen.declaration import Geometry
 from mpam_calib.specimen.load_cell import odd_readings
 from mpam_calib.specimen.motion import run_ids
+from mpam_calib.specimen.odd_tensile import odd_tests
 from mpam_calib.specimen.plausibility import longest_contraction
 from mpam_calib.specimen.recording import Floats, Loops, Specimen
 from mpam_calib.specimen.repeats import repeated_rows
@@ -37,7 +38,7 @@ BELOW_GAS = 10.0
 SLOW_HZ, FAST = 0.05, 0.2
 """Readings rarer than this, and crossheads faster (m/s), are no tensile tester's."""
 STIFFNESS_PA = 100.0, 1e11
-"""Between these are the moduli of everything that a bladder is made of, and far beyond."""
+"""Between these are the declared moduli of everything that a bladder is made of, and far beyond."""
 STRETCHED = 0.01
 """A bladder that is longer than at rest by more than this share pulls by itself."""
 LITTLE_FURTHER = 0.01
@@ -63,7 +64,7 @@ def oddities(specimen: Specimen) -> list[str]:
     if specimen.geometry is not None:
         remarks += _odd_forces(specimen) + _odd_signs(specimen)
     remarks += _odd_contractions(specimen)
-    remarks += _odd_stiffness(specimen)
+    remarks += _odd_stiffness(specimen) + odd_tests(specimen)
     gauge, top = specimen.sensors.pressure_bias_sd_kPa, float(specimen.levels_Pa.max(initial=0.0)) / KPA
     if gauge > top > 0.0:
         remarks.append(f"sensors: pressure_bias_sd_kPa = {gauge:g} is above the highest level, {top:.4g} kPa")
@@ -326,9 +327,6 @@ def _odd_stiffness(specimen: Specimen) -> list[str]:
     stiffness: dict[str, float] = {}
     if specimen.simulation.E_Pa is not None:
         stiffness["E_Pa: a modulus of"] = max(map(abs, specimen.simulation.E_Pa))
-    if specimen.tensile is not None and (stretched := specimen.tensile.strain > 0.0).any():
-        ratio = np.abs(specimen.tensile.stress_Pa[stretched] / specimen.tensile.strain[stretched])
-        stiffness["tensile: a stiffness of about"] = float(np.median(ratio))
     low, high = STIFFNESS_PA
     return [
         f"{what} {value:.2g} Pa; is it in pascals?"
