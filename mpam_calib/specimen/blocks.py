@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -241,6 +242,8 @@ def _bad_cell(label: str, row: int, name: str, cell: str, form: TextFormat) -> I
     if is_number(cell, other):
         expected = f'a number with the decimal mark "{form.decimal}" of the rest (mixed decimal marks)'
         return InputError(label, quoted(cell), expected, row, name)
+    if name == "time_s" and re.fullmatch(r".*\d:\d\d.*", cell):
+        return InputError(label, f"{quoted(cell)} (a clock time?)", "seconds", row, name)
     return InputError(label, quoted(cell), "a number", row, name)
 
 

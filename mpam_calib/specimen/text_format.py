@@ -11,9 +11,10 @@ from pathlib import Path
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import Column, Csv
 from mpam_calib.specimen.misread import refuse_thousands
+from mpam_calib.specimen.own_names import refuse_missing
 from mpam_calib.specimen.tables import TEXT_COLUMNS, TableSpec
 from mpam_calib.specimen.units_row import check_header_units, is_units_row
-from mpam_calib.specimen.wording import did_you_mean, listed, os_reason, quoted
+from mpam_calib.specimen.wording import listed, os_reason, quoted
 
 SAMPLE_BYTES = 1 << 17
 HEADER_ROWS = 64
@@ -184,20 +185,10 @@ def _fields(
     mapping: dict[str, Column],
     wanted: dict[str, str],
 ) -> tuple[Field, ...]:
+    refuse_missing(label, header_row, header, spec, mapping)
     fields = []
     for name, written in wanted.items():
         if written not in header:
-            if name in spec.required or name in mapping:
-                others = [cell for cell in header if cell]
-                spelling = did_you_mean(written, others)
-                role = " (or [columns] that say how it is called)" if written == name else f" (for {name})"
-                raise InputError(
-                    label,
-                    f"the columns {listed(others)}{spelling}",
-                    f"a column {quoted(written)}{role}",
-                    header_row,
-                    name,
-                )
             continue
         if header.count(written) > 1:
             raise InputError(label, f"{quoted(written)} twice", "each column once", header_row, name)

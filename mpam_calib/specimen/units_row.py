@@ -37,8 +37,8 @@ def is_units_row(label: str, row: int, cells: Sequence[str], fields: Sequence[Fi
     """
     read = [field for field in fields if field.name not in TEXT_COLUMNS and field.position < len(cells)]
     written = {field: cells[field.position].strip().strip("[]()") for field in read}
-    worth = {field: _worth(field.name, unit) for field, unit in written.items()}
-    if not any(written.values()) or None in worth.values():
+    known = {field: worth(field.name, unit) for field, unit in written.items()}
+    if not any(written.values()) or None in known.values():
         return False
     for field, unit in written.items():
         _check_scale(label, row, field, unit)
@@ -51,15 +51,25 @@ def check_header_units(label: str, row: int, header: Sequence[str], fields: Sequ
     ``row`` is the header's. What is none of the column's units is taken for a part of the name.
     """
     for field in fields:
-        found = _AT_THE_END.fullmatch(header[field.position])
-        if found and field.name not in TEXT_COLUMNS and header[field.position] != field.name:
-            _check_scale(label, row, field, next(filter(None, found.groups())).strip())
+        written = header[field.position]
+        if field.name not in TEXT_COLUMNS and written != field.name:
+            _check_scale(label, row, field, _stated_unit(written))
+
+
+def _stated_unit(name: str) -> str:
+    """What a column's name ends in, in brackets or behind a slash; nothing where it does not.
+
+    >>> _stated_unit("Load [lbf]"), _stated_unit("p/bar"), _stated_unit("Load")
+    ('lbf', 'bar', '')
+    """
+    found = _AT_THE_END.fullmatch(name)
+    return next(filter(None, found.groups())).strip() if found else ""
 
 
 def _check_scale(label: str, row: int, field: Field, unit: str) -> None:
     """Refuse a scale that is another unit's; any that is none is a lever's, or an area's."""
-    factor, size = _worth(field.name, unit), abs(field.scale)
-    others = {worth for worth in _units(field.name).values() if worth != factor}
+    factor, size = worth(field.name, unit), abs(field.scale)
+    others = {each for each in _units(field.name).values() if each != factor}
     if not unit or factor is None or _alike(size, factor) or not any(_alike(size, w) for w in others):
         return
     found, expected = f"the unit {quoted(unit)}", field.name.rpartition("_")[2]
@@ -71,8 +81,8 @@ def _check_scale(label: str, row: int, field: Field, unit: str) -> None:
     raise InputError(label, found, expected, row, field.name)
 
 
-def _alike(size: float, worth: float) -> bool:
-    return abs(size / worth - 1.0) < ALIKE
+def _alike(size: float, unit: float) -> bool:
+    return abs(size / unit - 1.0) < ALIKE
 
 
 def _units(name: str) -> dict[str, float]:
@@ -80,6 +90,6 @@ def _units(name: str) -> dict[str, float]:
     return _IN.get(name.rpartition("_")[2], _PLAIN)
 
 
-def _worth(name: str, unit: str) -> float | None:
+def worth(name: str, unit: str) -> float | None:
     """What a unit is worth in that of a column's name; None for a word that is none of its units."""
     return 1.0 if not unit else _units(name).get(unit.lower())

@@ -108,7 +108,7 @@ CASES: dict[str, tuple[Spoil, list[str]]] = {
         rows(lambda lines: [lines[0].replace("force_N", "Force_n"), *lines[1:]]),
         ["loops.csv:1:force_N: ", 'did you mean "Force_n"?', 'a column "force_N"'],
     ),
-    "no header": (rows(lambda lines: lines[1:]), ["loops.csv:1:time_s: ", 'expected a column "time_s"']),
+    "no header": (rows(lambda lines: lines[1:]), ["loops.csv:1:time_s: ", 'expected the columns "time_s"']),
     "column twice": (
         rows(lambda lines: [line + (",force_N" if not i else ",1.0") for i, line in enumerate(lines)]),
         ['loops.csv:1:force_N: found "force_N" twice'],
