@@ -200,20 +200,25 @@ def _odd_level_forces(specimen: Specimen) -> list[str]:
     assert geometry is not None
     if loops is None or len(np.unique(loops.level)) < 2:
         return []
-    remarks, top = [], {}
+    top = {}
     for index in np.unique(loops.level):
         at = loops.level == index
         pulls = float(np.quantile(loops.force_N[at], USUAL_SHARE))
         top[int(index)] = pulls if loops.displacement_m[at].min() > -STRETCHED * geometry.L0 else 0.0
+    found = []
     for index, pulls in top.items():
         gas = _gas_force(geometry, float(specimen.levels_Pa[index]), 0.0)
         others = float(np.median([force for other, force in top.items() if other != index]))
         if pulls > BELOW_GAS * gas and pulls > 0.5 * others:
-            remarks.append(
-                f"loops: forces up to {pulls:.3g} N at {specimen.levels_Pa[index] / KPA:.4g} kPa, where "
-                f"the gas pulls about {gas:.2g} N; is every file's pressure in kPa, and the load cell zeroed?"
-            )
-    return remarks
+            found.append((pulls / gas if gas > 0.0 else np.inf, index, pulls, gas))
+    if not found:
+        return []
+    _, index, pulls, gas = max(found)
+    more = "" if len(found) == 1 else f" (likewise at {len(found) - 1} of the other levels)"
+    return [
+        f"loops: forces up to {pulls:.3g} N at {specimen.levels_Pa[index] / KPA:.4g} kPa, where the gas "
+        f"pulls about {gas:.2g} N{more}; is every file's pressure in kPa, and the load cell zeroed?"
+    ]
 
 
 def _odd_signs(specimen: Specimen) -> list[str]:
@@ -299,13 +304,18 @@ def _odd_contractions(specimen: Specimen) -> list[str]:
         if beyond:
             remarks.append(
                 f"{name}: {beyond} rows contract further than the braid's limit of {limit:.3f} "
-                f"(largest {contraction.max():.3f}); is alpha0_deg from the hoop direction?"
+                f"(largest {contraction.max():.3f}); is alpha0_deg from the hoop direction{_or_else(name)}?"
             )
         if straight:
             remarks.append(
                 f"{name}: {straight} rows are longer than the straight strands (contraction {longest:.3f})"
             )
     return remarks
+
+
+def _or_else(name: str) -> str:
+    """What else makes contractions too large: those of loops may be lengths, or per cent of L0."""
+    return ", or is displacement_mm not the shortening in mm" if name == "loops" else ""
 
 
 def _braid_limit(geometry: Geometry, kinematics: str) -> float:

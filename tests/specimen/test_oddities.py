@@ -92,6 +92,21 @@ def test_what_is_hardly_meant_is_said(change: Change, said: str, tmp_path: Path)
     assert said in remarks(tmp_path, change)
 
 
+@pytest.mark.parametrize(("change", "more"), [(times(1, 0.01), True), (one_level_in_bar, False)])
+def test_levels_whose_forces_are_far_above_the_gas_s_are_said_in_one_line(
+    change: Change, more: bool, tmp_path: Path
+) -> None:
+    found = remarks(tmp_path, change)
+    assert found.count("is every file's pressure in kPa") == 1
+    assert ("(likewise at " in found) == more
+
+
+def test_contractions_of_another_unit_beyond_the_braid_s_limit_are_asked_about(tmp_path: Path) -> None:
+    asked = "from the hoop direction, or is displacement_mm not the shortening in mm?"
+    assert asked in remarks(tmp_path / "a", times(2, 2.0))
+    assert "hoop direction" not in remarks(tmp_path / "b")
+
+
 def test_a_handful_of_readings_is_said_to_be_one(tmp_path: Path) -> None:
     lines = loops().text().splitlines()
     few = "\n".join(lines[:13]) + "\n"
