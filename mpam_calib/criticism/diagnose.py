@@ -9,6 +9,8 @@ from typing import Any
 
 from mpam_calib.criticism.budget import Budget, misfit_budget
 from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
+from mpam_calib.criticism.fitting.fit import extended
+from mpam_calib.criticism.fitting.noise_scale import settle_guess
 from mpam_calib.criticism.gain import Gain, measure_gain
 from mpam_calib.criticism.limits import Band, hidden_sizes
 from mpam_calib.criticism.searching.candidates import Candidates, candidates
@@ -93,6 +95,9 @@ def diagnose(
     assumed = blueprint.braid if specimen.braid is None else None
     problem = build_problem(specimen, blueprint)
     tested = candidates(problem)
+    if problem.noise_guessed:
+        sets = [frozenset[str](), *(frozenset({e}) for e in tested.tested)]
+        problem = settle_guess(problem, [extended(problem.blueprint, s) for s in sets])
     found = search(problem, tested.tested, partial(listener, "searching"), workers=WORKERS, journal=journal)
     problem = found.problem  # its noise settled by the best set
     verdict = judge(found)
@@ -131,6 +136,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "assumed_braid": None if diagnosis.leant_on is None else diagnosis.leant_on.model_dump(),
         "limits": [_limit(diagnosis, e) for e in sorted(diagnosis.limits)],
         "noise_N": _round(budget.noise),
+        "noise_assumed": diagnosis.problem.noise_guessed,
         "misfit_before_N": _round(budget.before),
         "misfit_after_N": _round(budget.after),
         "remainder_N": _round(budget.remainder),

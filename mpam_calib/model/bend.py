@@ -41,15 +41,18 @@ MOST: Final = 3.0
 """Largest logarithm of the factor, whatever the coefficients."""
 EARLY: Final = 20.0
 """Duration of the test over that of the part in which something that settles does most of it."""
+LEAST_APART: Final = 0.02
+"""Share of the top pressure by which lowest and top level count as apart at least."""
 TURN_SHARE: Final = 0.01
 """Share of the stroke from which on the driver ``travel`` counts its decades."""
 CYCLES: Final = 2.0
 """Cycles from the middle to the ends of the driver ``cycles``."""
 
 
-def _pressure(state: State, setting: Setting) -> Array:
+def place_in_pressure(state: State, setting: Setting) -> Array:
+    """The pressure, from −1 at the lowest level to 1 at the top; beside one level a regulator does little."""
     low, high = float(setting.levels[0]), setting.top_pressure
-    return (2.0 * state.readings.pressure - low - high) / max(high - low, 1.0)
+    return (2.0 * state.readings.pressure - low - high) / max(high - low, LEAST_APART * high, 1.0)
 
 
 def _travel(state: State, setting: Setting) -> Array:
@@ -59,7 +62,7 @@ def _travel(state: State, setting: Setting) -> Array:
 
 DRIVERS: Final[Mapping[str, Callable[[State, Setting], Array]]] = {
     "contraction": lambda state, setting: 2.0 * state.readings.displacement / setting.stroke - 1.0,
-    "pressure": _pressure,
+    "pressure": place_in_pressure,
     "force": lambda state, setting: np.abs(state.guide) / setting.force_scale - 1.0,
     "time": lambda state, setting: 2.0 * state.readings.time / max(setting.duration, 1.0) - 1.0,
     "settling": lambda state, setting: (

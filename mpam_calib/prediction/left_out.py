@@ -40,7 +40,7 @@ READINGS = 200
 """Readings of a level that are predicted."""
 DRAWS, PROPOSED = 400, 2000
 RELIABLE = 0.7
-"""Pareto's k up to which reweighted draws are believed."""
+"""Pareto's k up to which reweighted draws are believed; S of them up to 1 − 1/log10 S (Vehtari et al.)."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def _reweighted(fold: Collapsed, draws: Draws, whole: Array, rng: np.random.Gene
 
     ratio = _likelihood(fold, draws) - whole
     weight, shape = az.psislw(np.where(np.isfinite(ratio), ratio, -np.inf))
-    if float(shape) <= RELIABLE:
+    if float(shape) <= min(RELIABLE, 1.0 - 1.0 / np.log10(len(draws))):
         return draws.u[rng.choice(len(draws), len(draws), p=np.exp(weight))]
     start = draws.u[int(np.argmax(ratio))]
     mixture = laplace_mixture(climb_modes(fold, [start, draws.u.mean(axis=0)]))

@@ -77,6 +77,12 @@ def _next(causes: list[dict[str, Any]]) -> list[Block]:
     return [Notice(Markup(words))] if causes else []
 
 
+def _noise(content: dict[str, Any]) -> str:
+    if not content["noise_assumed"]:
+        return "of one reading"
+    return "of one reading, assumed: too few readings tell it, and no force_sd_N is declared"
+
+
 def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen) -> Page:
     """The page for one diagnosis; ``content`` is that of ``diagnosis.json``."""
     word = found.verdict.word
@@ -88,7 +94,7 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
             [
                 KeyNumber("Misfit before", significant(content["misfit_before_N"]), "N", "", "beyond noise"),
                 KeyNumber("Misfit after", significant(content["misfit_after_N"]), "N", "", "beyond noise"),
-                KeyNumber("Noise", significant(content["noise_N"]), "N", "", "of one reading"),
+                KeyNumber("Noise", significant(content["noise_N"]), "N", "", _noise(content)),
             ]
         ),
     ]

@@ -13,6 +13,7 @@ from rig.specimens import FAMILIES, loops_muscle
 
 from mpam_calib.criticism.data.problem import Problem, build_problem
 from mpam_calib.criticism.data.static_noise import static_noise
+from mpam_calib.criticism.diagnose import diagnose
 from mpam_calib.criticism.searching.candidates import candidates
 from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.verdict import Verdict, judge
@@ -105,3 +106,14 @@ def test_nothing_hidden_is_adequate(seed: int, noise: float) -> None:
 def test_a_cause_is_named_beside_a_noise_that_nobody_declared() -> None:
     found = verdict_on(map_of(0, 0.005, dead=0.05))
     assert (found.word, found.standing) == ("named", {"dead_band"})
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_of_a_few_readings_the_noise_is_what_the_models_leave(seed: int) -> None:
+    """So few that no neighbours tell it, and several times as noisy as the first guess: no fault is seen."""
+    few = map_of(seed, 0.02, points=2)
+    found = diagnose(few)
+    assert found.problem.noise_guessed
+    assert found.verdict.word == "adequate"
+    first = build_problem(few, found.problem.blueprint).noise_level.total
+    assert found.budget.noise > 1.5 * first

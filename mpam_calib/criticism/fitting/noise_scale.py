@@ -11,6 +11,7 @@ uncertainty; the maximum is taken for all.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from math import log
 
 import numpy as np
@@ -41,10 +42,11 @@ MOST_ORDER = 5
 def settle_noise(problem: Problem, space: Sequence[Simulation]) -> Problem:
     """The problem with its noise scaled as the most probable flexible model of a space asks.
 
-    Where it is a guess, as all models together ask (:func:`_settle_guess`).
+    Where it is a guess, as all models together ask (:func:`settle_guess`).
     """
     if problem.noise_guessed:
-        return _settle_guess(problem, space)
+        plain = [s for s in space if s.law in FLEXIBLE and s.order <= MOST_ORDER] or list(space)
+        return settle_guess(problem, [problem.blueprint.model_copy(update={"simulation": s}) for s in plain])
     law = next((law for law in FLEXIBLE if any(s.law == law for s in space)), "")
     flexible = [s for s in space if s.law == law and s.order <= MOST_ORDER] or list(space)
     top = max(s.order for s in flexible)
@@ -87,15 +89,13 @@ def _by_scale(problem: Problem, fits: Iterable[Fit], log_scales: Array) -> Array
     return np.asarray(np.logaddexp.reduce(terms, axis=0))
 
 
-def _settle_guess(problem: Problem, space: Sequence[Simulation]) -> Problem:
-    """Noise that no reading told before: its mean (of logarithms) under all models with a law without rates.
+def settle_guess(problem: Problem, blueprints: Sequence[Blueprint]) -> Problem:
+    """Noise that no reading told before: its mean (of logarithms) under all models, of laws without rates.
 
     The flexible ones alone fit a few readings whatever the noise is; and of three readings the most probable
     noise is next to none. Where the scale is far off, parameters that are settled there are others: the fits
     are made again.
     """
-    plain = [s for s in space if s.law in FLEXIBLE and s.order <= MOST_ORDER] or list(space)
-    blueprints = [problem.blueprint.model_copy(update={"simulation": s}) for s in plain]
     found, at = problem, 0.0
     for _ in range(ROUNDS):
         fits = [each for b in blueprints if (each := _fits(found, b, {}))]
@@ -107,7 +107,8 @@ def _settle_guess(problem: Problem, space: Sequence[Simulation]) -> Problem:
         found = problem.with_noise_scale(float(np.exp(at)))
         if abs(at - before) < SETTLED:
             break
-    return found
+    level = problem.noise_level
+    return replace(found, noise_level=replace(level, white=float(np.exp(at)) * level.white))
 
 
 def _fits(problem: Problem, blueprint: Blueprint, starts: dict[int, dict[str, float]]) -> dict[int, Fit]:

@@ -7,6 +7,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy import special
 
+from mpam_calib.model.bend import place_in_pressure
 from mpam_calib.model.curves import middle_pressure, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
@@ -45,14 +46,8 @@ def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     return (*bends, *_level(setting))
 
 
-def _place(state: State, setting: Setting) -> Array:
-    """The pressure, from −1 at the lowest level to 1 at the top."""
-    low, high = float(setting.levels[0]), setting.top_pressure
-    return (2.0 * state.readings.pressure - low - high) / max(high - low, 1.0)
-
-
 def _apply(state: State, values: Values, setting: Setting) -> State:
-    x = _place(state, setting)
+    x = place_in_pressure(state, setting)
     gain: Array = 1.0 + values.get(LEVEL, np.zeros((1, 1)))
     for j in _degrees(setting):
         gain = gain + values[f"law_bend_{j}"] * legendre.legval(x, [0.0] * j + [1.0])
@@ -64,7 +59,7 @@ def _exponential(state: State, values: Values, setting: Setting) -> State:
     if not (degrees := _degrees(setting)):
         return state
     first, rate = degrees[0], np.clip(values["law_curvature"], -10.0, 10.0)
-    x = np.clip(_place(state, setting), -1.5, 1.5)
+    x = np.clip(place_in_pressure(state, setting), -1.5, 1.5)
     # exp(κx) = Σ (2j + 1) i_j(κ) P_j(x), over its first part beyond the law, which κ = 0 leaves alone.
     part, curve = np.ones((1, 1)), np.zeros((1, 1))
     for j in range(first, first + SERIES):
