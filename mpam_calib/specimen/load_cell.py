@@ -11,8 +11,6 @@ from mpam_calib.units import KPA, MM
 
 AT_TURNS = 0.02
 """Share of a stroke's way, at either end, where a crosshead that dwells repeats a force by itself."""
-
-
 OFF = 0.05
 """Share of the largest force up to which a smallest force is no zero that is off."""
 ALIKE = 0.2
