@@ -26,8 +26,9 @@ STANDS = 25.0
 LISTED = 5
 BESIDE = 10.0
 """Nats below the likeliest set down to which these data hardly separate others from it."""
-NOISE_SIZE = 0.5
-"""A remainder whose root mean square is below this share of a reading's noise is at its level."""
+NOISE_SIZE, ASSUMED = 0.5, 1.0
+"""A remainder whose root mean square is below this share of a reading's noise is at its level, and below that
+share of a noise that was only assumed."""
 TRACE, TRACE_SIZE = 1e-6, 0.2
 """p-value of a test of structure from which on the likeliest set leaves something that no noise explains, and
 its root mean square as a share of a reading's noise: the tests suppose that the noise is known."""
@@ -125,7 +126,8 @@ def _structure_left(found: Search, leading: Set, size: int) -> bool:
     held = found.fits[leading, size]
     if bare is not None and held.log_evidence - bare.log_evidence < LEAD:
         return False
-    return remainder_rms(found.problem, held) > NOISE_SIZE * found.problem.noise_level.total
+    share = ASSUMED if found.problem.noise_guessed else NOISE_SIZE
+    return remainder_rms(found.problem, held) > share * found.problem.noise_level.total
 
 
 def _trace(problem: Problem, fitted: Fit) -> Structure | None:

@@ -134,14 +134,14 @@ def scores_of(scores: dict[frozenset[str], float]) -> Callable[[Search, Problem,
 def test_others_are_listed_however_far_behind(margins: range, listed: int, near: int) -> None:
     """At least the five likeliest, and those that come near as far as the tenth."""
     behind = {frozenset([f"effect_{m}"]): float(np.exp(-m)) for m in margins}
-    verdict = Verdict("named", CAUSE, CAUSE, {CAUSE: 1.0, **behind}, {}, 0)
+    verdict = Verdict("named", CAUSE, CAUSE, {CAUSE: 1.0, **behind}, {})
     assert list(verdict.others()) == list(behind)[:listed]
     assert verdict.near() == near
 
 
 def test_a_likeliest_set_that_does_not_stand_takes_no_other_s_place() -> None:
     behind = {frozenset([f"effect_{m}"]): float(np.exp(-m)) for m in range(9)}
-    verdict = Verdict("unexplained", CAUSE, NOTHING, {CAUSE: 1.0, **behind}, {}, 0)
+    verdict = Verdict("unexplained", CAUSE, NOTHING, {CAUSE: 1.0, **behind}, {})
     assert list(verdict.others()) == [CAUSE, *behind]
 
 
@@ -226,6 +226,30 @@ def test_an_adequate_simulation_is_told_with_its_own_remainder_and_what_could_hi
     verdict = judge(found)
     assert (verdict.word, verdict.leading) == ("adequate", NOTHING)
     assert verdict.unseen == ({CAUSE} if hidden else set())
+
+
+@pytest.mark.parametrize(
+    ("left", "assumed", "word"),
+    [
+        (0.45, False, "adequate"),
+        (0.55, False, "unexplained"),
+        (0.95, True, "adequate"),
+        (1.05, True, "unexplained"),
+    ],
+)
+def test_a_remainder_counts_from_half_the_noise_on_or_from_all_that_is_assumed(
+    problem: Problem, left: float, assumed: bool, word: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain = problem.with_force(problem.force - 3.0 * problem.noise_level.total)
+    found = Search(replace(plain, noise_guessed=assumed), (), Alone(plain))
+    bare, beside = (fit(plain, NOTHING, size) for size in range(2))
+    found.fits[NOTHING, 0] = bare
+    found.fits[NOTHING, 1] = replace(beside, log_evidence=bare.log_evidence + 9.0)
+    share = left * problem.noise_level.total
+    monkeypatch.setattr(verdict_module, "remainder_rms", lambda problem, fitted: share)
+    monkeypatch.setattr(verdict_module, "load_cell_rival", lambda found, leading: NO_RIVAL)
+    monkeypatch.setattr(verdict_module, "_standing", lambda found, leading: leading)
+    assert judge(found).word == word
 
 
 @pytest.mark.parametrize(
