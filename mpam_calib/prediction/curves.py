@@ -44,8 +44,6 @@ class Curves:
     ``noise`` (what a new reading adds) and ``contraction_noise`` (N,), its sd.
     """
 
-    pressures: Array
-    contractions: Array
     force: Array
     noise: ReadingNoise
     contraction_noise: Array
@@ -93,7 +91,7 @@ def force_curves(model: Model, draws: Draws, pressures: Array, contractions: Arr
     zero = np.zeros(len(draws))
     own = draws.values[CONTRACTION_SD][:, 0] if CONTRACTION_SD in draws.values else zero
     noise = ReadingNoise(draws.values, model.setting.force_scale)
-    return Curves(pressures, contractions, force, noise, own)
+    return Curves(force, noise, own)
 
 
 def pressure_rng(seed: int, stream: int, pressure: float) -> np.random.Generator:
