@@ -30,8 +30,8 @@ def test_extension_and_force_become_engineering_strain_and_stress(tmp_path: Path
 
 def test_absolute_pressures_become_gauge_pressures(tmp_path: Path) -> None:
     """As said behind the mapping of a pressure in bar."""
-    (line,) = re.findall(r"^# (pressure_kPa = \{.*)", TEMPLATE, flags=re.MULTILINE)
-    mapping, offset = re.fullmatch(r"(.*) \} +# absolute readings: and (offset = \S+)", line).groups()  # type: ignore[union-attr]
+    shown = r"^# (pressure_kPa = \{.*) \} +# absolute readings: and (offset = \S+)$"
+    ((mapping, offset),) = re.findall(shown, TEMPLATE, flags=re.MULTILINE)
     geometry = "[geometry]\nL0_mm = 50.0\nR0_mm = 3.0\nt0_mm = 0.7\nalpha0_deg = 72.0\n"
     files = '[files]\nblocked_force = "blocked.csv"\n'
     columns = f"[columns.blocked_force]\n{mapping}, {offset} }}\n"
