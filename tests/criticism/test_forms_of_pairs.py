@@ -16,14 +16,15 @@ from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import Fit, fit
 from mpam_calib.criticism.fitting.forms import forms_of, price
 from mpam_calib.criticism.fitting.refits import (
+    causes_of,
     ended,
     in_another_form,
-    in_two_other_equations,
     other_forms,
     with_better_forms,
     with_doubt,
 )
-from mpam_calib.criticism.tasks.spread import held_problem, spread_over
+from mpam_calib.criticism.searching.searched import Search
+from mpam_calib.criticism.tasks.spread import Alone, held_problem, spread_over
 
 TRUE = frozenset({"creep:early", "presliding"})
 """A level that was held before its first stroke, which a turn began: both act on its first readings."""
@@ -63,6 +64,14 @@ def priced(found: Fit) -> Fit:
     return replace(found, log_evidence=found.log_evidence - sum(map(price, sorted(found.effects))))
 
 
+def in_two_other_equations(problem: Problem, found: Fit) -> Fit:
+    """What a search makes of a fit that it has alone."""
+    causes = causes_of(found)
+    search = Search(problem, tuple(sorted(causes)), Alone(problem), {(causes, found.size): found})
+    search.in_two_other_equations([causes])
+    return search.fits[causes, found.size]
+
+
 def with_better_forms_of(found: Fit, effect: str) -> Fit:
     """The best fit in which this effect alone has another form."""
     (kept,) = (e for e in found.effects if e.partition(":")[0] != effect)
@@ -93,7 +102,7 @@ def test_two_equations_come_out_of_a_bend_that_no_change_of_one_leads_out_of(cur
     trapped, true = doubted(curved, frozenset({"pressure_droop", "tip_shape:bent"})), doubted(curved, CURVED)
     with spread_over(curved, 1):
         alone = [in_another_form((trapped, form)) for form in other_forms(trapped)]
-        found = in_two_other_equations(trapped)
+    found = in_two_other_equations(curved, trapped)
     assert max(f.log_evidence for f in alone if f is not None) < true.log_evidence - 10.0
     assert found.effects == CURVED
     assert found.log_evidence == pytest.approx(true.log_evidence, abs=0.05)
@@ -101,5 +110,4 @@ def test_two_equations_come_out_of_a_bend_that_no_change_of_one_leads_out_of(cur
 
 def test_no_other_two_are_taken_for_the_best(curved: Problem) -> None:
     true = doubted(curved, CURVED)
-    with spread_over(curved, 1):
-        assert in_two_other_equations(true) is true
+    assert in_two_other_equations(curved, true) is true

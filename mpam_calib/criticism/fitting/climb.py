@@ -23,9 +23,9 @@ Array = NDArray[np.float64]
 
 STEP = 1e-4
 ROUNDS = 25
-CONVERGED, SHARE = 5e-3, 1e-3
-"""Where the next round promises fewer nats than this, or than this share of what the fit leaves beyond twice
-the noise, the climb ends."""
+CONVERGED, NEARLY, SHARE = 5e-3, 0.05, 1e-3
+"""Where the next round promises fewer nats than the first (the second where that will do), or than this share
+of what the fit leaves beyond twice the noise, the climb ends."""
 KEPT = (0.25, 0.75)
 """Shares of the promise below which the damping grows, and above which it falls."""
 RIDGE = 0.02
@@ -88,7 +88,8 @@ class Place:
 class Climb:
     """A climb beside a remainder of SIZES[size]; ``extra`` (n, r), N, are further linear columns.
 
-    One that has no hope to come near the objective ``rival`` is given up on its way.
+    One that has no hope to come near the objective ``rival`` is given up on its way; ``converged`` are the
+    nats that the last round may still promise.
     """
 
     problem: Problem
@@ -96,6 +97,7 @@ class Climb:
     size: int
     extra: Array
     rival: float = -np.inf
+    converged: float = CONVERGED
     _kept: tuple[Array, Unsigned] | None = field(default=None, init=False, repr=False)
     _sloped: tuple[Place, Array] | None = field(default=None, init=False, repr=False)
 
@@ -316,7 +318,7 @@ class Climb:
             if released and damping < RIDGE and best.objective + HOPE * promise < self.rival - SHORT:
                 break
             left = misfit - 2.0 * len(self.problem)
-            if d == 0 or (promise < max(CONVERGED, SHARE * left) and not waiting and released):
+            if d == 0 or (promise < max(self.converged, SHARE * left) and not waiting and released):
                 break
             # Sizes first: the bend of a size near zero says nothing and wanders off.
             released = released or promise < COARSE * misfit

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from mpam_calib.criticism.data.problem import Problem
-from mpam_calib.criticism.fitting.climb import Climb, Place, plus_one
+from mpam_calib.criticism.fitting.climb import CONVERGED, Climb, Place, plus_one
 from mpam_calib.criticism.fitting.doubt import doubts
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.chain import Chain
@@ -144,17 +144,19 @@ def fit(
     blueprint: Blueprint | None = None,
     doubts: tuple[float, ...] = (),
     rival: float = -np.inf,
+    converged: float = CONVERGED,
 ) -> Fit:
     """Refit the simulation with these effects against a remainder of SIZES[size].
 
     ``start`` gives coordinates by parameter name to start from (0 otherwise); ``blueprint`` another
     declared simulation than the problem's; ``doubts`` how far the effects' forms may be off, with equal
     prior probabilities (none: not at all); a climb without hope to come near the objective of a ``rival``
-    ends early. Raises ``LinAlgError`` where no climb from there ends.
+    ends early, and each where a round promises fewer nats than ``converged``. Raises ``LinAlgError`` where no
+    climb from there ends.
     """
     key = (blueprint or problem.blueprint).model_dump_json()
     chain, n = chain_for(key, effects), len(problem)
-    climb = Climb(problem, chain, size, np.empty((n, 0)), rival)
+    climb = Climb(problem, chain, size, np.empty((n, 0)), rival, converged)
     u = np.array([(start or {}).get(name, 0.0) for name in climb.names], dtype=np.float64)
     place = climb.climb(u, climb.guide(), np.zeros(chain.linear_size))
     plain = _fitted(effects, climb, place, 0.0)

@@ -8,11 +8,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import combinations, product
+from itertools import product
 
 import numpy as np
 from scipy import linalg
 
+from mpam_calib.criticism.fitting.climb import CONVERGED, NEARLY
 from mpam_calib.criticism.fitting.doubt import DOUBTS
 from mpam_calib.criticism.fitting.fit import Fit, fit
 from mpam_calib.criticism.fitting.forms import equations_of, flexible, forms_of, price
@@ -91,20 +92,19 @@ def in_another_form(task: tuple[Fit, str]) -> Fit | None:
     return None if at_word is None or at_word.log_evidence < plain - HOPELESS else with_doubt(at_word)
 
 
-def in_two_other_equations(found: Fit) -> Fit:
-    """A doubted fit with the pair of its effects in other equations that suits it best, if it is better so.
+def with_two_other_equations(task: tuple[Fit, tuple[str, str]]) -> Fit | None:
+    """A fit with a pair of its effects in the other equations that suit it best, at their word.
 
     A bend of one may hold what the other's equation lacks, and then no change of one alone leads on.
     """
+    found, pair = task
     own = named_forms(found)
     best: Fit | None = None
-    for pair in combinations(sorted(own), 2):
-        for forms in product(*(equations_of(e) for e in pair)):
-            if all(form != own[e] for e, form in zip(pair, forms, strict=True)):
-                choice = own | dict(zip(pair, forms, strict=True))
-                best = _better(best, tuple(choice.values()), found.size, ended(found))
-    rivals = [] if best is None else [with_doubt(best)]
-    return max([found, *rivals], key=lambda f: f.log_evidence)
+    for forms in product(*(equations_of(e) for e in pair)):
+        if all(form != own[e] for e, form in zip(pair, forms, strict=True)):
+            choice = own | dict(zip(pair, forms, strict=True))
+            best = _better(best, tuple(choice.values()), found.size, ended(found))
+    return best
 
 
 def _best_with(found: Fit, forms: list[str]) -> Fit | None:
@@ -172,7 +172,16 @@ def _better(
         with warnings.catch_warnings(), np.errstate(over="ignore", invalid="ignore"):
             warnings.simplefilter("ignore", linalg.LinAlgWarning)
             rival = -np.inf if best is None or doubts else best.objective
-            found = fit(held_problem(), frozenset(forms), size, start, doubts=doubts, rival=rival)
+            # At its word a set is only ranked: what is reported is climbed again, with its doubts.
+            found = fit(
+                held_problem(),
+                frozenset(forms),
+                size,
+                start,
+                doubts=doubts,
+                rival=rival,
+                converged=CONVERGED if doubts else NEARLY,
+            )
     except np.linalg.LinAlgError:
         return best
     found = replace(found, log_evidence=found.log_evidence - sum(map(price, sorted(forms))))

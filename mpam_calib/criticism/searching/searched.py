@@ -24,13 +24,13 @@ from mpam_calib.criticism.fitting.refits import (
     causes_of,
     ended,
     in_another_form,
-    in_two_other_equations,
     named_forms,
     other_forms,
     with_better_forms,
     with_better_kinds,
     with_doubt,
     with_doubted_equations,
+    with_two_other_equations,
 )
 from mpam_calib.criticism.tasks.spread import Spread
 from mpam_calib.model.bend import is_bend
@@ -251,11 +251,22 @@ class Search:
         least = self.score(first) - NEAR
         listed = [s for s in self.sets if further or not s > first]
         near = [s for s in listed if self.score(s) > least and bends(self.best_fit(s))][:IN_PAIRS]
-        found = self.spread(in_two_other_equations, [self.best_fit(s) for s in near])
-        self.fits |= {(s, fit.size): fit for s, fit in zip(near, found, strict=True)}
+        self.in_two_other_equations(near)
         least = self.score(self.sets[0]) - CLOSE
         listed = [s for s in self.sets if further or not s > self.sets[0]]
         self.refit_in_forms([s for s in listed if self.score(s) > least][:IN_ALL_FORMS])
+
+    def in_two_other_equations(self, sets: Iterable[Set]) -> None:
+        """Give doubted sets the pair of other equations that suits each best, where that is better."""
+        tasks = [(self.best_fit(s), pair) for s in sets for pair in combinations(sorted(s), 2)]
+        at_word: dict[Set, Fit] = {}
+        for fit in self.spread(with_two_other_equations, tasks):
+            if fit is not None:
+                known = at_word.setdefault(causes_of(fit), fit)
+                at_word[causes_of(fit)] = max(known, fit, key=lambda f: f.log_evidence)
+        for effects, fit in zip(at_word, self.spread(with_doubt, at_word.values()), strict=True):
+            if fit.log_evidence > self.fits[effects, fit.size].log_evidence:
+                self.fits[effects, fit.size] = fit
 
     def refit_in_forms(self, sets: Iterable[Set], spread: Spread | None = None) -> None:
         """Refit sets with one of their effects in another form, doubted; from the likeliest once more."""
