@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mpam_calib.criticism.unexplained.load_cell import FAULT, LATE, RESCALED, ZEROED
-from mpam_calib.report.numbers import significant, with_band
+from mpam_calib.report.numbers import significant
 
 CELL_FAULTS = {
     FAULT: ("that shows less and less of large forces", "load it with dead weights up to the blocked force"),
@@ -24,8 +24,9 @@ CELL_FAULTS = {
 }
 """What a load cell does that explains the readings, and how to look at it."""
 
-CELL_SIZES = {FAULT: ("cell_knee_N", "from {} N on"), LATE: ("cell_delay_s", "by {} s")}
-"""The parameter of such a fault that is told, and how."""
+CELL_SIZES = {FAULT: ("cell_knee_N", "from about {} N on"), LATE: ("cell_delay_s", "by about {} s")}
+"""The parameter of such a fault that is told, and how: without a band, which knows nothing of how roughly
+the fault itself is reckoned."""
 
 FAULTS = {
     "repeating_N": "a fine structure of {} N comes back in every stroke at the same place",
@@ -68,6 +69,5 @@ def _of_load_cell(fault: str, nats: float, parameters: dict[str, dict[str, float
     cell, look = CELL_FAULTS[fault]
     if fault in CELL_SIZES:
         name, said = CELL_SIZES[fault]
-        _, band = with_band(*(parameters[name][q] for q in ("mean", "q05", "q95")))
-        cell += f" ({said.format(band)})"
+        cell += f" ({said.format(significant(parameters[name]['mean'], 2))})"
     return f"a load cell {cell} explains the readings {'better' if nats > 0.0 else 'nearly as well'}: {look}"
