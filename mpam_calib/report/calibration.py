@@ -24,7 +24,7 @@ from mpam_calib.report.page import (
     Text,
 )
 from mpam_calib.report.parameters import RIGHT, learnt_table, summary_table
-from mpam_calib.report.reach import endless
+from mpam_calib.report.reach import MOST, contraction_band, still_pulling
 from mpam_calib.report.spoken import spoken
 from mpam_calib.report.tensile import tensile_lead, tensile_sections
 from mpam_calib.report.trust import assess
@@ -58,14 +58,25 @@ def _lead(view: CalibrationView) -> list[Block]:
         )
     free = view.at_level("free_contraction", top)
     if free is not None:
-        value, band = _band(free, 100.0)
-        parts.append(Markup("shortens by ") + spoken(value, band, "%", " of its length without load"))
-        note = f"at {top:.4g} kPa, of the length at rest"
-        note += "; the upper end is where the curves end" if endless(view, free) else ""
-        cards.append(KeyNumber("Free contraction", value, "%", f"90 % band: {band} %", note))
+        words, card = _free(view, free)
+        parts.append(words)
+        cards.append(card)
     cards += _fit_cards(view)
     sentence = Markup("At {} kPa, {} {}.").format(f"{top:.4g}", view.name, Markup(" and ").join(parts))
     return [Headline(sentence), Numbers(cards), assess(view)]
+
+
+def _free(view: CalibrationView, free: pd.Series) -> tuple[Markup, KeyNumber]:
+    """The top level's free contraction in the headline and on its card, or that the muscle pulls there."""
+    value, band = contraction_band(view, free)
+    note = f"at {view.top_level_kPa:.4g} kPa, of the length at rest"
+    if (which := still_pulling(view, free)) in MOST:
+        words = Markup("<b>{} %</b> contraction").format(value)
+        said = f"{which} of the plausible curves do, and end there"
+        return words, KeyNumber("Free contraction", value, "%", said, note)
+    words = Markup("shortens by ") + spoken(value, band, "%", " of its length without load")
+    note += "; some of the plausible curves pull as far as they go" if which else ""
+    return words, KeyNumber("Free contraction", value, "%", f"90 % band: {band} %", note)
 
 
 def _fit_cards(view: CalibrationView) -> list[KeyNumber]:
@@ -83,8 +94,8 @@ def _fit_cards(view: CalibrationView) -> list[KeyNumber]:
     return [KeyNumber("Levels left out", text, "%", words, "should be 90 %")]
 
 
-def _band(row: pd.Series, scale: float = 1.0) -> tuple[str, str]:
-    return with_band(*(scale * float(row[q]) for q in ("mean", "q05", "q95", "q50")))
+def _band(row: pd.Series) -> tuple[str, str]:
+    return with_band(*(float(row[q]) for q in ("mean", "q05", "q95", "q50")))
 
 
 def _sections(view: CalibrationView) -> list[Section]:
@@ -142,7 +153,7 @@ def _pressure_section(view: CalibrationView) -> Section:
         "Line: median. Dark and light band: 50 % and 90 %. Dots: the levels of the data; hollow where "
         "the readings end before." + (" Crosses: readings of the test itself." if measured else "")
     )
-    if any(endless(view, view.at_level("free_contraction", level)) for level in view.levels_kPa):
+    if any(still_pulling(view, view.at_level("free_contraction", level)) for level in view.levels_kPa):
         caption += f" A band that goes up to {100 * view.curves_end:.3g} % ends only where the curves end."
     levels = pd.DataFrame([_level_row(view, level) for level in sorted(float(x) for x in view.levels_kPa)])
     right = dict.fromkeys(levels.columns, "{}")
@@ -185,13 +196,13 @@ def _left_out_section(view: CalibrationView) -> Section:
 
 
 def _level_row(view: CalibrationView, level: float) -> dict[str, str]:
+    blocked, free = view.at_level("blocked_force_N", level), view.at_level("free_contraction", level)
     row = {"pressure (kPa)": f"{level:.4g}"}
-    for name, quantity, scale in (
-        ("blocked force (N)", "blocked_force_N", 1.0),
-        ("free contraction (%)", "free_contraction", 100.0),
+    for name, cells in (
+        ("blocked force (N)", None if blocked is None else _band(blocked)),
+        ("free contraction (%)", None if free is None else contraction_band(view, free)),
     ):
-        found = view.at_level(quantity, level)
-        mean, band = ("–", "–") if found is None else _band(found, scale)
+        mean, band = cells or ("–", "–")
         row |= {name: mean, f"90 % band of the {name.split(' (')[0]}": band}
     return row
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mpam_calib.design.robust import Design
 from mpam_calib.prediction.curves import LIMIT
 from mpam_calib.report.design_bounds import marks
-from mpam_calib.report.numbers import fixed, with_band
+from mpam_calib.report.numbers import fixed, with_band, with_open_end
 from mpam_calib.report.page import DataTable
 from mpam_calib.units import DEG, KPA, MM
 
@@ -31,11 +31,11 @@ def mean_band(draws: Array) -> tuple[str, str]:
 
 def contraction_band(draws: Array) -> tuple[str, str]:
     """Mean and 90 % band of free contractions, in percent; an end where no root was found says so."""
-    value, band = mean_band(100.0 * draws)
-    if np.quantile(draws, 0.95) < LIMIT - 1e-9:
-        return value, band
-    low = band.split("–")[0]
-    return f"at least {value}", f"{low} to beyond {100 * LIMIT:.0f}"
+    percent = 100.0 * draws
+    low, middle, high = np.quantile(percent, [0.05, 0.5, 0.95])
+    if high < 100.0 * LIMIT - 1e-7:
+        return mean_band(percent)
+    return with_open_end(float(percent.mean()), float(low), float(high), float(middle))
 
 
 def same_design(a: Design, b: Design) -> bool:

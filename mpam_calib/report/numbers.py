@@ -65,6 +65,16 @@ def with_band(mean: float, low: float, high: float, median: float | None = None)
     return f"{text} (median)" if outside else text, band
 
 
+def with_open_end(mean: float, low: float, end: float, median: float) -> tuple[str, str]:
+    """Value and band of what was looked for up to an ``end`` only, and in some draws not found by then.
+
+    >>> with_open_end(21.3, 19.12, 22.5, 21.6)
+    ('at least 21.3', '19.1 to beyond 22.5')
+    """
+    value, band = with_band(mean, low, end, median)
+    return f"at least {value}", f"{band.split('–')[0]} to beyond {end:.3g}"
+
+
 def ten_to(power: int) -> str:
     """The factor as it is printed behind a number.
 

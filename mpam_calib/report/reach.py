@@ -7,10 +7,13 @@ from typing import Final
 import pandas as pd
 
 from mpam_calib.report.limit import Limit
+from mpam_calib.report.numbers import with_band, with_open_end
 from mpam_calib.report.view import CalibrationView
 
 UNSEEN: Final = 0.1
 """Share of the free contraction that readings may end before, and yet come near it."""
+MOST: Final = ("all", "most")
+"""Of the curves without a free contraction: where it is these, there is none to be stated."""
 CARRIED: Final = "the simulation carries the number there, not the data."
 
 
@@ -25,7 +28,8 @@ def extrapolation(view: CalibrationView) -> Limit | None:
         names.append("blocked force")
         sentences.append(f"No reading comes near the blocked force at {top}: {CARRIED}")
     free = view.at_level("free_contraction", view.top_level_kPa)
-    if free is not None and bool(free["extrapolated"]) and (told := _unseen(view, free)):
+    stated = free is not None and still_pulling(view, free) not in MOST
+    if free is not None and stated and bool(free["extrapolated"]) and (told := _unseen(view, free)):
         names.append("free contraction")
         sentences.append(f"{told} at {top}: {CARRIED}")
     if not names:
@@ -35,15 +39,19 @@ def extrapolation(view: CalibrationView) -> Limit | None:
 
 
 def cut_off(view: CalibrationView) -> Limit | None:
-    """The free contraction's band ends where the curves do."""
+    """The free contraction, or its band's upper end, lies beyond the curves."""
     free = view.at_level("free_contraction", view.top_level_kPa)
-    if not endless(view, free):
+    if not (which := still_pulling(view, free)):
         return None
-    sentence = (
-        "Some of the plausible curves pull wherever they were looked at, up to a contraction of "
-        f"{100 * view.curves_end:.3g} %: the upper end of the free contraction's band is where they end."
+    end = f"{100 * view.curves_end:.3g} %"
+    pull = (
+        f"{which.capitalize()} of the plausible curves pull wherever they were looked at, up to a contraction"
     )
-    return Limit("caution", sentence, "the free contraction's band ends only where the curves end")
+    if which in MOST:
+        sentence = f"{pull} of {end}: there is no free contraction to be stated."
+        return Limit("caution", sentence, f"the muscle still pulls at a contraction of {end}")
+    sentence = f"{pull} of {end}: the free contraction's band has no upper end."
+    return Limit("caution", sentence, "the free contraction's band has no upper end")
 
 
 def between_ends(view: CalibrationView) -> Limit | None:
@@ -73,6 +81,24 @@ def _unseen(view: CalibrationView, free: pd.Series) -> str:
     return f"The readings go to {100 * furthest / free['mean']:.0f} % of the free contraction"
 
 
-def endless(view: CalibrationView, free: pd.Series | None) -> bool:
-    """Whether a free contraction's band ends where the curves do, some of which have no root."""
-    return free is not None and bool(free["q95"] >= view.curves_end - 1e-9)
+def still_pulling(view: CalibrationView, free: pd.Series | None) -> str:
+    """Which of the curves have no free contraction, as they pull to their end: "" where hardly any.
+
+    A curve without a root counts with its end, so that a mean there is that of such curves alone.
+    """
+    if free is None:
+        return ""
+    ends = (("mean", "all"), ("q50", "most"), ("q95", "some"))
+    return next((which for column, which in ends if free[column] >= view.curves_end - 1e-9), "")
+
+
+def contraction_band(view: CalibrationView, free: pd.Series) -> tuple[str, str]:
+    """A free contraction and its 90 % band as printed, in percent; what was not found has no value."""
+    which = still_pulling(view, free)
+    mean, low, high, median = (100.0 * float(free[q]) for q in ("mean", "q05", "q95", "q50"))
+    if not which:
+        return with_band(mean, low, high, median)
+    value, band = with_open_end(mean, low, high, median)
+    if which not in MOST:
+        return value, band
+    return f"still pulls at {high:.3g}", band if low < high - 1e-7 else "–"

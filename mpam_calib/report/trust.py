@@ -26,7 +26,7 @@ from mpam_calib.report.held import (
 from mpam_calib.report.limit import Limit
 from mpam_calib.report.noise_size import noise_known, noise_size
 from mpam_calib.report.numbers import significant
-from mpam_calib.report.reach import UNSEEN, between_ends, cut_off, extrapolation
+from mpam_calib.report.reach import UNSEEN, between_ends, cut_off, extrapolation, still_pulling
 from mpam_calib.report.view import CalibrationView
 
 REMAINDER_CAUTION: Final = 0.02
@@ -224,7 +224,12 @@ CHECKS: tuple[Check, ...] = (
         "the readings near full length lie in their bands",
         lambda view: _enough(held_near(view)) and noise_size(view) is None,
     ),
-    Check(band_width, f"the bands are within ± {100 * WIDE_CAUTION:.0f} %"),
+    # A band without an upper end, which the check leaves out, is not within anything.
+    Check(
+        band_width,
+        f"the bands are within ± {100 * WIDE_CAUTION:.0f} %",
+        lambda view: view.tensile or cut_off(view) is None,
+    ),
     Check(
         extrapolation,
         f"nothing is extrapolated by more than {100 * UNSEEN:.0f} %",
@@ -273,7 +278,7 @@ def _sentence(level: Level, limits: list[Limit]) -> str:
 
 
 def headline_bands(view: CalibrationView) -> list[tuple[str, float, float, float]]:
-    """Name, mean, q05 and q95 of each headline number, in its own unit."""
+    """Name, mean, q05 and q95 of each headline number whose band has two ends, in its own unit."""
     if view.tensile:
         rows = view.stress()
         chosen = [("stress at the largest strain", rows.iloc[-1])]
@@ -282,7 +287,8 @@ def headline_bands(view: CalibrationView) -> list[tuple[str, float, float, float
         chosen = []
         for words, quantity in pairs:
             row = view.at_level(quantity, view.top_level_kPa)
-            if row is not None:
+            endless = quantity == "free_contraction" and still_pulling(view, row)
+            if row is not None and not endless:
                 chosen.append((words, row))
     return [(words, float(row["mean"]), float(row["q05"]), float(row["q95"])) for words, row in chosen]
 

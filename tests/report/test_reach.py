@@ -8,12 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpam_calib.report import reach
+from mpam_calib.report import reach, trust
 from mpam_calib.report.calibration import calibration_page
 from mpam_calib.report.trust import assess
 from mpam_calib.report.view import CalibrationView
 
-from .synthetic import muscle
+from .synthetic import Z, muscle
+from .test_calibration_page import words_of
 
 
 @pytest.fixture(scope="module")
@@ -81,10 +82,54 @@ def test_a_band_that_ends_where_the_curves_do(sound: CalibrationView) -> None:
     limit = reach.cut_off(ended)
     assert limit is not None and limit.level == "caution"
     assert f"up to a contraction of {100 * np.round(row['q95'], 3):.3g} %" in limit.sentence
-    page = calibration_page(ended).render()
-    assert "the upper end is where the curves end" in page
-    assert "ends only where the curves end." in page
+    assert "ends only where the curves end." in calibration_page(ended).render()
     assert "where the curves end" not in calibration_page(sound).render()
+
+
+LOW, END = 0.30, 0.333
+"""5 % quantile of a free contraction, and the end of the curves."""
+
+
+def ending(view: CalibrationView, which: str) -> CalibrationView:
+    """The view with curves that end at 33.3 %, before some, most or all of them have stopped pulling."""
+    bands = view.bands.copy()
+    rows = (bands["quantity"] == "free_contraction") & (bands["pressure_kPa"] == 250.0)
+    names = {"some": ["q95"], "most": ["q50", "q75", "q95"], "all": list(Z)}[which]
+    bands.loc[rows, [*Z, "mean"]] = [LOW, 0.31, 0.315, 0.32, 0.325, 0.316]
+    bands.loc[rows, names + (["mean"] if which == "all" else [])] = END
+    bands.loc[rows, "extrapolated"] = True
+    return replace(view, bands=bands, curves_end=END)
+
+
+@pytest.mark.parametrize(
+    ("which", "headline", "cells"),
+    [
+        (
+            "some",
+            "shortens by at least 31.6 % of its length without load (90 % band 30.0 to beyond 33.3 %)",
+            ("at least 31.6", "30.0 to beyond 33.3"),
+        ),
+        ("most", "still pulls at 33.3 % contraction.", ("still pulls at 33.3", "30.0 to beyond 33.3")),
+        ("all", "still pulls at 33.3 % contraction.", ("still pulls at 33.3", "–")),
+    ],
+)
+def test_a_free_contraction_beyond_the_curves_is_not_stated(
+    sound: CalibrationView, which: str, headline: str, cells: tuple[str, str]
+) -> None:
+    """The end of the curves, at which those without a root count, is no result, and its band no band."""
+    view = ending(cut(sound, 0.5), which)
+    html = calibration_page(view).render()
+    lead, rest = (words_of(part) for part in html.split("<nav"))
+    assert headline in lead
+    assert f"{which.capitalize()} of the plausible curves pull wherever" in lead
+    assert "".join(cells) in rest
+    assert "33.300" not in lead + rest
+    # What has no upper end is neither wide nor narrow.
+    assert [name for name, *_ in trust.headline_bands(view)] == ["blocked force"]
+    assert "the bands are within" in " ".join(assess(sound).reasons)
+    assert "the bands are within" not in " ".join(assess(view).reasons)
+    # How far the readings go is told beside a free contraction that was found only.
+    assert ("of the free contraction at 250 kPa" in lead) == (which == "some")
 
 
 def test_forces_between_the_ends_of_the_curve_are_not_to_be_taken_where_none_was_read(
