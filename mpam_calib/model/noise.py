@@ -34,7 +34,7 @@ def white_noise_prior(force_sd: float | None, force_scale: float) -> LogNormal:
 def white_noise_parameter(setting: Setting) -> Parameter:
     """Standard deviation of one reading."""
     prior = white_noise_prior(setting.force_sd, setting.force_scale)
-    return Parameter(WHITE, prior, "sensor noise of one reading, one sigma")
+    return Parameter(WHITE, prior, "white noise, new in every reading, one sigma")
 
 
 def correlated_noise_parameters(
@@ -47,9 +47,9 @@ def correlated_noise_parameters(
     shortest = SHORTEST * reading_time
     median = 0.3 * (setting.force_sd or 0.003 * setting.force_scale)
     return (
-        Parameter(CORRELATED, LogNormal(median, 1.0), "noise that lasts for a moment, one sigma"),
+        Parameter(CORRELATED, LogNormal(median, 1.0), "noise that lasts over several readings, one sigma"),
         Parameter(
-            TIME, LogUniform(shortest, max(stroke_time / 30.0, 2.0 * shortest)), "how long that moment is"
+            TIME, LogUniform(shortest, max(stroke_time / 30.0, 2.0 * shortest)), "how long such noise lasts"
         ),
     )
 

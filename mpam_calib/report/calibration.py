@@ -85,7 +85,7 @@ def _fit_cards(view: CalibrationView) -> list[KeyNumber]:
     unseen = f"at a pressure level that the fit had not seen, {held} of readings fell in bands meant for 90 %"
     if math.isfinite(view.remainder):
         size, noise = (fixed(x, decimals(x)) for x in (view.remainder, view.noise))
-        words = f"sensor noise: {noise} N" if math.isfinite(view.noise) else ""
+        words = f"noise of a reading: {noise} N" if math.isfinite(view.noise) else ""
         return [KeyNumber("Simulation misses by", size, "N", words, "" if held is None else unseen)]
     if held is None:
         return []
@@ -131,13 +131,13 @@ def _sections(view: CalibrationView) -> list[Section]:
 def _noisy_words(view: CalibrationView) -> str:
     if view.quantity("force_N_observed").empty:
         return ""
-    return " Dotted: where 90 % of new readings fall, sensor noise included."
+    return " Dotted: where 90 % of new readings fall, their noise included."
 
 
 def _residual_section(view: CalibrationView) -> Section:
     caption = (
         "Readings minus simulation. Dots: single readings. Lines: their means over short stretches of the "
-        "stroke, one colour for each level. Grey: one sigma of the sensor noise."
+        "stroke, one colour for each level. Grey: one sigma of a reading's noise."
     )
     return Section(
         "What the simulation misses",

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
+import numpy as np
+
 from mpam_calib.model.noise import WHITE
 from mpam_calib.report.blocks import Level
 from mpam_calib.report.limit import Limit
@@ -41,10 +43,28 @@ def noise_size(view: CalibrationView) -> Limit | None:
     return None
 
 
-def noise_known(view: CalibrationView) -> bool:
-    """Whether there is anything to compare the fitted noise with."""
-    known = any(_known(noise) is not None for noise in (view.reading_noise, view.declared_noise))
-    return math.isfinite(_fitted(view)) and known
+def lasting_noise(view: CalibrationView) -> Limit | None:
+    """White noise and what lasts are together far above what is declared, though neither is a misfit.
+
+    That is ordinary (a hum, a pressure that swings), and the bands hold it.
+    """
+    declared, whole = _known(view.declared_noise), _whole(view)
+    if noise_size(view) is not None or not declared:
+        return None
+    if whole <= NOISE_CAUTION * declared or whole <= NEGLIGIBLE * top_force(view):
+        return None
+    words = f"a reading's noise is {_newtons(whole)}, against the declared force_sd_N = {declared:g}"
+    sentence = (
+        f"A{words[1:]}: it lasts over several readings, as a hum, a pressure that swings or a misfit "
+        "does. The bands follow the readings; look at the load cell's cable and at the regulator."
+    )
+    return Limit("good", sentence, words)
+
+
+def noise_as_declared(view: CalibrationView) -> bool:
+    """Whether the noise of a reading, white and lasting, was held against a declared one and is near it."""
+    declared, whole = _known(view.declared_noise), _whole(view)
+    return declared is not None and whole <= NOISE_CAUTION * declared
 
 
 def _level(fitted: float, known: float, top: float) -> Level:
@@ -86,6 +106,11 @@ def _newtons(force: float) -> str:
 def _fitted(view: CalibrationView) -> float:
     rows = view.summary[view.summary["parameter"] == WHITE]
     return math.nan if rows.empty or view.tensile else float(rows["mean"].iloc[0])
+
+
+def _whole(view: CalibrationView) -> float:
+    """One sigma (N) of a reading's noise, whether new in it or lasting; nan where there is none."""
+    return float(np.fmax(_fitted(view), math.nan if view.tensile else view.noise))
 
 
 def _known(noise: float) -> float | None:

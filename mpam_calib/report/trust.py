@@ -24,7 +24,7 @@ from mpam_calib.report.held import (
     held_near,
 )
 from mpam_calib.report.limit import Limit
-from mpam_calib.report.noise_size import noise_known, noise_size
+from mpam_calib.report.noise_size import NOISE_CAUTION, lasting_noise, noise_as_declared, noise_size
 from mpam_calib.report.numbers import significant
 from mpam_calib.report.reach import UNSEEN, between_ends, cut_off, extrapolation, still_pulling
 from mpam_calib.report.view import CalibrationView
@@ -73,7 +73,7 @@ def convergence(view: CalibrationView) -> Limit | None:
 
 
 def remainder(view: CalibrationView) -> Limit | None:
-    """The simulation misses the data by more than the sensor's noise."""
+    """The simulation misses the data by more than a reading's noise."""
     top = _top_value(view)
     if not (math.isfinite(view.remainder) and math.isfinite(view.noise)) or top <= 0:
         return None
@@ -85,7 +85,7 @@ def remainder(view: CalibrationView) -> Limit | None:
     largest = "stress" if view.tensile else "blocked force"
     sentence = (
         f"The simulation is wrong by about {size} (root mean square, {100 * share:.1f} % of the largest "
-        f"{largest}; sensor noise: {significant(view.noise, 2)} {unit}). "
+        f"{largest}; noise of a reading: {significant(view.noise, 2)} {unit}). "
         f"The bands include this.{_advice(view)}"
     )
     level: Level = "good" if share <= REMAINDER_CAUTION else "caution" if share <= REMAINDER_BAD else "bad"
@@ -184,6 +184,10 @@ def _always(view: CalibrationView) -> bool:
     return True
 
 
+def _noise_ordinary(view: CalibrationView) -> bool:
+    return noise_size(view) is None and lasting_noise(view) is None
+
+
 def _enough(held: Held | None) -> bool:
     return held is not None and held.enough
 
@@ -212,11 +216,16 @@ CHECKS: tuple[Check, ...] = (
     ),
     Check(beyond_levels),
     Check(wandering),
-    Check(noise_size, "the noise is that of the load cell", noise_known),
+    Check(noise_size),
+    Check(
+        lasting_noise,
+        f"the noise of a reading is at most {NOISE_CAUTION:g} times the declared one",
+        lambda view: noise_as_declared(view) and noise_size(view) is None,
+    ),
     Check(
         remainder,
         "the simulation fits to within the noise or half a per cent",
-        lambda view: math.isfinite(view.remainder) and math.isfinite(view.noise) and noise_size(view) is None,
+        lambda view: math.isfinite(view.remainder) and math.isfinite(view.noise) and _noise_ordinary(view),
     ),
     Check(overruled_slack),
     Check(

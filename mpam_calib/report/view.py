@@ -78,7 +78,7 @@ class CalibrationView:
     ``draws`` and ``prior_draws``: parameter name to draws, shape (draws,), for the names in
     ``headline`` (at most eight are shown), ``meanings`` what each parameter is, in a few words.
     ``remainder`` is the root mean square of what the
-    simulation leaves out and ``noise`` one sigma of the sensor, both in N (Pa for a tensile test);
+    simulation leaves out and ``noise`` one sigma of a reading, both in N (Pa for a tensile test);
     nan where not assessed; ``reading_noise`` (N) is what readings scatter by from one to the next,
     ``declared_noise`` the declared ``force_sd_N``; ``strays_kPa`` how far the strokes of each level
     stray from its pressure, shape (levels,), empty without loops; ``curves_end`` the contraction up to which

@@ -7,15 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from model import build
 from prediction.coverage import as_specimen, rig_case
 
 from mpam_calib.calibration import calibrate
+from mpam_calib.model.blueprint import draw_blueprint
+from mpam_calib.model.noise import correlated_noise_parameters, white_noise_parameter
 from mpam_calib.report import noise_size
+from mpam_calib.report.calibration import calibration_page
 from mpam_calib.report.limit import Limit
+from mpam_calib.report.trust import assess
 from mpam_calib.report.view import CalibrationView
 from mpam_calib.run.view import view_of
 
 from .synthetic import muscle
+from .test_calibration_page import words_of
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +59,49 @@ def test_noise_against_what_is_known(
     view = noisy(sound, fitted, reading, declared)
     limit = noise_size.noise_size(view)
     assert (limit.level if limit else None) == level
-    assert noise_size.noise_known(view) == (reading is not None or declared is not None)
+
+
+PRAISE = "the noise of a reading is at most 3 times the declared one"
+
+
+@pytest.mark.parametrize(
+    ("white", "whole", "reading", "declared", "praised", "told"),
+    [
+        (0.25, 0.3, 0.25, 0.25, True, False),
+        (0.018, 1.5, 0.02, 0.25, False, True),  # a hum, which white noise knows nothing of
+        (0.018, 1.5, 0.02, None, False, False),  # nothing to compare it with
+        (0.3, 0.3, 0.002, None, False, False),  # small beside the force, but never compared
+        (0.3, 0.3, 0.25, 0.01, False, False),  # compared, and far off, if not worth a word
+        (3.0, 3.0, 2.9, 0.25, False, False),  # noise that another check tells
+    ],
+)
+def test_the_whole_noise_is_compared_with_the_declared_one(
+    sound: CalibrationView,
+    white: float,
+    whole: float,
+    reading: float,
+    declared: float | None,
+    praised: bool,
+    told: bool,
+) -> None:
+    view = replace(noisy(sound, white, reading, declared), noise=whole)
+    limit = noise_size.lasting_noise(view)
+    assert (limit is not None) == told
+    reasons = " ".join(assess(view).reasons)
+    assert (PRAISE in reasons) == praised
+    if limit is not None:
+        assert limit.level == "good"
+        assert limit.brief == "a reading's noise is 1.5 N, against the declared force_sd_N = 0.25"
+        assert limit.sentence in reasons and "fits to within the noise" not in reasons
+
+
+def test_white_noise_and_noise_that_lasts_are_told_apart() -> None:
+    """By their names in the table, which must not call either of them the sensor's noise alone."""
+    setting = draw_blueprint(build.specimen({}, build.loops())).setting()
+    assert setting is not None
+    white, lasting = white_noise_parameter(setting), correlated_noise_parameters(setting, 60.0, 0.1)[0]
+    assert white.meaning == "white noise, new in every reading, one sigma"
+    assert lasting.meaning == "noise that lasts over several readings, one sigma"
 
 
 @pytest.mark.parametrize(("lasting", "told"), [(0.25, False), (4.0, False), (9.0, True)])
@@ -64,6 +112,12 @@ def test_noise_that_lasts_is_ordinary_unless_it_is_huge(
     assert (limit is not None) == told
     if limit is not None:
         assert limit.level == "caution" and "9.0 N against 0.25 N" in limit.brief
+
+
+def test_the_card_calls_the_whole_noise_that_of_a_reading(sound: CalibrationView) -> None:
+    words = words_of(calibration_page(replace(sound, noise=1.5)).render())
+    assert "noise of a reading: 1.5 N" in words
+    assert "sensor noise" not in words
 
 
 def test_what_is_said(sound: CalibrationView) -> None:
