@@ -6,7 +6,7 @@ import math
 
 import pandas as pd
 
-from mpam_calib.report.numbers import superscript
+from mpam_calib.report.numbers import probability, superscript
 from mpam_calib.report.page import Block, DataTable, Section, Text
 
 WORDS = {"order": "Orders", "law": "Laws"}
@@ -108,9 +108,9 @@ def choices_section(odds: pd.DataFrame, levels: pd.DataFrame) -> Section:
     blocks += [Text(s) for model in WHOSE if (s := level_sentence(levels, model))]
     blocks.append(
         DataTable(
-            odds,
+            odds.assign(probability=[probability(p) for p in odds["probability"]]),
             "Each choice by itself (log evidence in nats)",
-            {"log_evidence_declared": "{:.2f}", "log_evidence": "{:.2f}", "probability": "{:.3g}"},
+            {"log_evidence_declared": "{:.2f}", "log_evidence": "{:.2f}", "probability": "{}"},
             collapse=True,
         )
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import pandas as pd
 from markupsafe import Markup
@@ -13,14 +14,15 @@ from mpam_calib.model.nuisance import nuisance_parameters
 from mpam_calib.posterior.likelihood.floor import pulling
 from mpam_calib.posterior.likelihood.points import KINDS, gather_points
 from mpam_calib.report.choices import choices_section
-from mpam_calib.report.numbers import fixed, significant
+from mpam_calib.report.numbers import fixed, probability, significant
 from mpam_calib.report.page import Block, DataTable, Headline, Notice, Page, Section, Text, Verdict
 from mpam_calib.report.wording import left_aside
 from mpam_calib.specimen.recording import Specimen
 
 SHOWN = 20
 SURE = 0.95
-CHOICES = ["kinematics", "strain", "order", "law", "friction", "effects"]
+NAMED = ("kinematics", "strain", "order", "law", "friction")
+CHOICES = [*NAMED, "effects"]
 MEASURED = 4e-4
 """Nats to which the rules of integration were measured: what their own errors say below is not to be had."""
 FIGURES = ("probability", "n", "log evidence", "error (N)", "density (nats)")
@@ -36,15 +38,28 @@ AS_DECLARED = Markup(
 )
 
 
-def short_name(row: pd.Series) -> str:
-    """One model in a few words."""
-    return f"{row['kinematics']}, {row['strain']}, M = {row['order']}, {row['law']}, {row['friction']}"
+def short_name(row: pd.Series, choices: Sequence[str] = NAMED) -> str:
+    """One model in a few words, by these choices."""
+    return ", ".join(f"M = {row[c]}" if c == "order" else str(row[c]) for c in choices)
+
+
+def compared(models: pd.DataFrame) -> tuple[str, ...]:
+    """The choices in which the models differ; all, where there is but one model."""
+    return tuple(c for c in NAMED if (models[c] != models[c].iloc[0]).any()) or NAMED
+
+
+def not_compared(models: pd.DataFrame) -> str:
+    """The choices that are alike in all models, of which the ranking says nothing; "" where there is none."""
+    alike = [c for c in NAMED if c not in compared(models)]
+    return ", ".join(f"{c} ({models[c].iloc[0]})" for c in alike)
 
 
 def selection_sentence(models: pd.DataFrame) -> str:
     """What the data say of the models (best first), or that they cannot tell."""
+    if len(models) == 1:
+        return f"Nothing could be chosen: {short_name(models.iloc[0])} is the only model."
     if float(models["probability"].iloc[0]) >= SURE:
-        return f"The data ask for {short_name(models.iloc[0])}."
+        return f"The data ask for {short_name(models.iloc[0], compared(models))}."
     together = models["probability"].cumsum().searchsorted(SURE) + 1
     return f"The data cannot tell: {together} models share {SURE:.0%} of the probability."
 
@@ -70,10 +85,11 @@ def held_out_sentence(models: pd.DataFrame) -> tuple[bool, str]:
     apart = abs(float(first["elpd_held_out"] - other["elpd_held_out"]))
     error = math.hypot(first["elpd_held_out_se"], other["elpd_held_out_se"])
     by = f"{fixed(apart, 1)} nats, standard error up to {fixed(error, 1)}"
-    winner = "the same model" if agrees else short_name(other)
+    choices = compared(models)
+    winner = "the same model" if agrees else short_name(other, choices)
     if apart >= error:
         return agrees, f"held-out pressure levels prefer {winner} ({by})"
-    unclear = f"that does not tell it apart from {short_name(other if agrees else first)}"
+    unclear = f"that does not tell it apart from {short_name(other if agrees else first, choices)}"
     return True, f"held-out pressure levels put {winner} first, but {unclear} ({by})"
 
 
@@ -82,7 +98,7 @@ def ranking_table(models: pd.DataFrame) -> tuple[pd.DataFrame, str]:
     first = models.iloc[0]
     constant = [c for c in CHOICES if len(models) > 1 and (models[c] == first[c]).all()]
     table = models[[c for c in CHOICES if c not in constant]].copy()
-    table["probability"] = [f"{p:.3g}" for p in models["probability"]]
+    table["probability"] = [probability(p) for p in models["probability"]]
     table["n"] = models["n_parameters"]
     table["log evidence"] = _with_errors(models, "log_evidence", 2, MEASURED)
     errors = models["rmse_held_out_N"].astype(float)
@@ -151,20 +167,29 @@ def not_in_evidence(specimen: Specimen) -> list[str]:
 def selection_page(found: Selection, specimen: Specimen) -> Page:
     """The page for one selection."""
     models = found.models
-    sure = float(models["probability"].iloc[0]) >= SURE
+    sure = float(models["probability"].iloc[0]) >= SURE and len(models) > 1
     agrees, said = held_out_sentence(models)
-    reasons = [f"the best model by evidence has probability {models['probability'].iloc[0]:.3g}", said]
+    likely = probability(float(models["probability"].iloc[0]))
+    reasons = [f"the best model by evidence has probability {likely}", said]
+    if len(models) == 1:
+        reasons = ["there is no other model to compare it with"]
+    if alike := not_compared(models):
+        reasons.append(f"not compared, as all models have the same: {alike}")
+    if found.noise_guess is not None:
+        reasons.append("the noise of a reading is only assumed, and all probabilities with it")
     if uncertain := declared_sds(specimen):
         reasons.append(f"declared uncertainties ({', '.join(uncertain)}) are not in the evidence")
+    good = sure and agrees and not uncertain and found.noise_guess is None
     lead: list[Block] = [
         Headline(selection_sentence(models)),
-        Verdict("Model selection", "good" if sure and agrees and not uncertain else "caution", reasons),
+        Verdict("Model selection", "good" if good else "caution", reasons),
         Notice(AS_DECLARED.format(", ".join(specimen.simulation.effects) or "none")),
     ]
     lead += [Notice(text) for text in [*left_aside(specimen, "ranking"), *not_in_evidence(specimen)]]
     if found.noise_guess is not None:
         lead.append(Notice(ASSUMED_NOISE.format(significant(found.noise_guess))))
-    names = [short_name(models.iloc[i]) for i in range(len(found.confusion))]
+    choices = compared(models)
+    names = [short_name(models.iloc[i], choices) for i in range(len(found.confusion))]
     table, same = ranking_table(models.head(SHOWN))
     sections = [
         Section(
@@ -178,11 +203,21 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
         _sensitivity_section(found, names),
     ]
     if found.replicates:
-        sections.append(_confusion_section(found, names))
+        sections.append(_confusion_section(found, names, recorded(specimen)))
     return Page(specimen.name, "Model selection", lead, sections)
 
 
-def _confusion_section(found: Selection, names: list[str]) -> Section:
+def recorded(specimen: Specimen) -> str:
+    """What a simulated set of readings stands for."""
+    parts = {
+        "loops": specimen.loops,
+        "a force map": specimen.force_map,
+        "blocked forces": specimen.blocked_force,
+    }
+    return " and ".join(name for name, part in parts.items() if part is not None)
+
+
+def _confusion_section(found: Selection, names: list[str], what: str) -> Section:
     """How often each leading model wins on data simulated from one of them."""
     confusion = pd.DataFrame(found.confusion, columns=[str(i + 1) for i in range(len(names))])
     confusion.insert(0, "simulated from", [f"{i + 1}: {name}" for i, name in enumerate(names)])
@@ -190,8 +225,9 @@ def _confusion_section(found: Selection, names: list[str]) -> Section:
         "Would data like these tell them apart?",
         [
             Text(
-                f"Each row: {found.replicates} sets of loops simulated from that model with this "
-                "specimen's design and noise; the columns say how often each model was then ranked first."
+                f"Each row: {found.replicates} sets of readings ({what}) simulated from that model with "
+                "this specimen's design and noise; the columns say how often each model was then ranked "
+                "first."
             ),
             DataTable(
                 confusion,
@@ -217,7 +253,8 @@ def _sensitivity_section(found: Selection, names: list[str]) -> Section:
     shares = found.sensitivity.pivot_table(index="model", columns="prior", values="probability")
     shares = shares[list(dict.fromkeys(found.sensitivity["prior"]))].reset_index(drop=True)
     winners = shares.to_numpy().argmax(axis=0)
-    formats = dict.fromkeys(shares.columns, "{:.3g}")
+    formats = dict.fromkeys(shares.columns, "{}")
+    shares = shares.map(probability)
     shares.insert(0, "probability among these", [f"{i + 1}: {name}" for i, name in enumerate(names)])
     return Section(
         "Does it depend on the priors?",

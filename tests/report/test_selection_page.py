@@ -14,10 +14,10 @@ from mpam_calib.criticism.selection.held_out import LEVEL_COLUMNS
 from mpam_calib.criticism.selection.odds import odds
 from mpam_calib.criticism.selection.select import COLUMNS, Selection
 from mpam_calib.report.choices import choice_sentences
-from mpam_calib.report.page import DataTable, Notice, Page, Text, Verdict
-from mpam_calib.report.selection import evidence_text, ranking_table, selection_page
+from mpam_calib.report.page import DataTable, Headline, Notice, Page, Text, Verdict
+from mpam_calib.report.selection import evidence_text, ranking_table, selection_page, selection_sentence
 from mpam_calib.specimen.declaration import GeometrySd, Sensors
-from mpam_calib.specimen.recording import FreeContraction, Specimen
+from mpam_calib.specimen.recording import ForceMap, FreeContraction, Specimen
 
 SPECIMEN = specimen_of("develop-null-006")
 
@@ -39,13 +39,14 @@ def page(
     sensitivity: pd.DataFrame | None = None,
     specimen: Specimen = SPECIMEN,
     noise: float | None = None,
+    replicates: int = 0,
 ) -> Page:
     if sensitivity is None:
         widths = [(i + 1, "as declared", 0.0, 1.0) for i in range(len(table))]
         sensitivity = pd.DataFrame(widths, columns=["model", "prior", "log_evidence", "probability"])
     levels = pd.DataFrame(columns=["model", *LEVEL_COLUMNS])
     chances = odds(table, SPECIMEN.simulation)
-    found = Selection(table, chances, levels, np.eye(len(table)), 0, sensitivity, 0.01, noise)
+    found = Selection(table, chances, levels, np.eye(len(table)), replicates, sensitivity, 0.01, noise)
     return selection_page(found, specimen)
 
 
@@ -54,8 +55,12 @@ def page(
     [
         (((-100.0, 1.0), (-110.0, 1.0)), "good", "prefer the same model"),
         (((-100.0, 8.0), (-101.0, 8.0)), "good", "does not tell it apart from"),
-        (((-110.0, 1.0), (-100.0, 1.0)), "caution", "prefer inextensible_braid, stretch, M = 2"),
-        (((-104.2, 8.6), (-100.0, 9.6)), "good", "M = 2, constant, coulomb first, but that does not tell"),
+        (((-110.0, 1.0), (-100.0, 1.0)), "caution", "prefer M = 2 ("),
+        (
+            ((-104.2, 8.6), (-100.0, 9.6)),
+            "good",
+            "put M = 2 first, but that does not tell it apart from M = 1",
+        ),
         ((UNKNOWN, UNKNOWN), "caution", "too few can be left out"),
         ((UNKNOWN, (-100.0, 1.0)), "caution", "say nothing of this model: it cannot be fitted"),
         (((-100.0, 1.0), UNKNOWN), "caution", "no other model has a figure"),
@@ -112,8 +117,58 @@ def test_rows_that_carry_no_evidence_are_counted() -> None:
 def test_a_noise_that_was_guessed_is_stated() -> None:
     table = models((-100.0, 1.0), (-110.0, 1.0))
     for noise, there in ((None, False), (2.1, True)):
-        notices = " ".join(b.html for b in page(table, noise=noise).lead if isinstance(b, Notice))
+        lead = page(table, noise=noise).lead
+        notices = " ".join(b.html for b in lead if isinstance(b, Notice))
         assert ("Noise of a reading: 2.10 N, assumed" in notices) is there
+        (verdict,) = (b for b in lead if isinstance(b, Verdict))
+        assert verdict.level == ("caution" if there else "good")
+        assert any("noise of a reading is only assumed" in reason for reason in verdict.reasons) is there
+
+
+def test_only_what_was_compared_is_said_to_be_asked_for() -> None:
+    """With moduli from elsewhere order, law and strain are the declared ones in every model."""
+    table = models((-100.0, 1.0), (-110.0, 1.0))
+    table["order"], table["friction"] = 2, ["coulomb", "none"]
+    table["kinematics"] = ["constant_thickness", "inextensible_braid"]
+    assert selection_sentence(table) == "The data ask for constant_thickness, coulomb."
+    (verdict,) = (b for b in page(table).lead if isinstance(b, Verdict))
+    alike = "not compared, as all models have the same: strain (stretch), order (2), law (constant)"
+    assert alike in verdict.reasons
+    every = table.assign(strain=["stretch", "engineering"], order=[1, 2], law=["constant", "linear"])
+    assert (
+        selection_sentence(every) == "The data ask for constant_thickness, stretch, M = 1, constant, coulomb."
+    )
+    (verdict,) = (b for b in page(every).lead if isinstance(b, Verdict))
+    assert not any("not compared" in reason for reason in verdict.reasons)
+
+
+def test_one_model_alone_is_no_choice() -> None:
+    shown = page(models((-100.0, 1.0)))
+    headline, verdict = shown.lead[:2]
+    assert isinstance(headline, Headline) and isinstance(verdict, Verdict)
+    assert headline.html.startswith("Nothing could be chosen: inextensible_braid, stretch, M = 1")
+    assert verdict.level == "caution"
+    assert not any("probability" in reason for reason in verdict.reasons)
+
+
+def test_no_probability_is_certain() -> None:
+    shown = page(models((-100.0, 1.0), (-110.0, 1.0)))
+    (verdict,) = (b for b in shown.lead if isinstance(b, Verdict))
+    assert "the best model by evidence has probability > 0.999" in verdict.reasons
+    tables = [b for s in shown.sections for b in s.blocks if isinstance(b, DataTable)]
+    columns = [t.frame[name] for t in tables for name in ("probability", "as declared") if name in t.frame]
+    assert len(columns) == 3
+    assert not any(str(p) in ("1", "1.0") for column in columns for p in column)
+
+
+@pytest.mark.parametrize(("static", "what"), [(False, "loops"), (True, "a force map")])
+def test_simulated_readings_are_called_what_they_stand_for(static: bool, what: str) -> None:
+    specimen = SPECIMEN
+    if static:
+        grid = ForceMap(*np.zeros((3, 3)), *np.zeros((2, 3), dtype=np.int64), np.zeros(3, dtype=bool))
+        specimen = replace(SPECIMEN, loops=None, force_map=grid)
+    shown = page(models((-100.0, 1.0), (-110.0, 1.0)), specimen=specimen, replicates=8)
+    assert f"8 sets of readings ({what}) simulated" in words_of(shown)
 
 
 def test_an_error_below_what_was_measured_is_not_shown() -> None:
@@ -126,8 +181,8 @@ def test_an_error_below_what_was_measured_is_not_shown() -> None:
     ("second", "said"),
     [
         ((0.1, 0.1), "The first model stays first under all of them."),
-        ((0.9, 0.9), "Another model is first under all of them: inextensible_braid, stretch, M = 2"),
-        ((0.1, 0.9), "Which model is first depends on them: inextensible_braid, stretch, M = 1"),
+        ((0.9, 0.9), "Another model is first under all of them: M = 2."),
+        ((0.1, 0.9), "Which model is first depends on them: M = 1; M = 2."),
     ],
 )
 def test_which_model_is_first_under_other_priors(second: tuple[float, float], said: str) -> None:
