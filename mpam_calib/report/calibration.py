@@ -267,7 +267,7 @@ def _identified_section(view: CalibrationView) -> Section:
     if view.unidentified.empty:
         return Section(
             "What the data could not identify",
-            [Text("Every parameter became much narrower than its prior: the data determine them all.")],
+            [Text("Nothing but noise and misfit was fitted: there is nothing to identify.")],
         )
     table = learnt_table(view)
     note = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from mpam_calib.report.numbers import fixed, significant, with_band
-from mpam_calib.report.trust import UNIDENTIFIED, WIDE_BAD
+from mpam_calib.report.trust import LITTLE, UNIDENTIFIED, WIDE_BAD
 from mpam_calib.report.view import CalibrationView
 
 RIGHT = dict.fromkeys(
@@ -67,7 +67,7 @@ def learnt_table(view: CalibrationView) -> pd.DataFrame:
 def _sentence(learnt: float, low: float, high: float) -> str:
     if learnt < UNIDENTIFIED:
         return "The data say nothing about it: what you see is what was assumed before the test."
-    if learnt < 0.5:
+    if learnt < LITTLE:
         return "The data say a little; the prior still matters."
     if low < 0.0 < high:
         return "The data narrow it down, but leave its sign open."

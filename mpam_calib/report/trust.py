@@ -38,6 +38,8 @@ WIDE_BAD: Final = 0.30
 """Half of the 90 % band over the value."""
 UNIDENTIFIED: Final = 0.20
 """A posterior that is narrower than its prior by less than this share learnt nothing."""
+LITTLE: Final = 0.50
+"""One that is narrower by less than this share learnt a little, and the prior still matters."""
 GAUGE_SHARE: Final = 0.5
 """The gauge limits the result when it makes up this share of the band ..."""
 GAUGE_TAKEN_UP: Final = 2.0
@@ -184,6 +186,12 @@ def _always(view: CalibrationView) -> bool:
     return True
 
 
+def _all_identified(view: CalibrationView) -> bool:
+    """Whether no row of the page's table says that the prior still matters."""
+    frame = view.unidentified
+    return not frame.empty and bool((frame["contraction"] >= LITTLE).all())
+
+
 def _noise_ordinary(view: CalibrationView) -> bool:
     return noise_size(view) is None and lasting_noise(view) is None
 
@@ -248,7 +256,7 @@ CHECKS: tuple[Check, ...] = (
     Check(between_ends),
     Check(source),
     Check(gauge),
-    Check(identification, "every parameter is identified", lambda view: not view.unidentified.empty),
+    Check(identification, "every parameter is identified", _all_identified),
 )
 
 

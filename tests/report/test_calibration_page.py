@@ -190,6 +190,7 @@ def test_static_map_without_branches_and_without_draws(view: CalibrationView) ->
     words = words_of(calibration_page(bare).render())
     assert "Simulation misses by" not in words and "Levels left out" not in words
     assert "Blue: loading" not in words
+    assert "there is nothing to identify" in words and "determine them all" not in words
     assert "Which parameters trade off" not in words
 
 

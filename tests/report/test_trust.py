@@ -9,6 +9,7 @@ import pytest
 
 from mpam_calib.report import trust
 from mpam_calib.report.numbers import significant
+from mpam_calib.report.parameters import learnt_table
 from mpam_calib.report.view import CalibrationView
 from mpam_calib.report.wording import convergence_sentences
 
@@ -38,6 +39,20 @@ def test_nothing_to_remark(sound: CalibrationView) -> None:
     verdict = trust.assess(replace(sound, unidentified=identified))
     assert verdict.sentence == "Yes: you can use these numbers with their bands."
     assert len(verdict.reasons) == 1
+
+
+@pytest.mark.parametrize(
+    ("learnt", "praised", "told"),
+    [(0.9, True, False), (0.5, True, False), (0.45, False, True), (0.1, False, False)],
+)
+def test_parameters_are_called_identified_by_the_table_s_limit(
+    sound: CalibrationView, learnt: float, praised: bool, told: bool
+) -> None:
+    frame = sound.unidentified.assign(contraction=0.9)
+    frame.loc[frame.index[0], "contraction"] = learnt
+    view = replace(sound, unidentified=frame)
+    assert ("every parameter is identified" in trust.assess(view).reasons[-1]) == praised
+    assert learnt_table(view)["what that means"].str.contains("the prior still matters").any() == told
 
 
 @pytest.mark.parametrize(
