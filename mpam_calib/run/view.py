@@ -24,6 +24,7 @@ from mpam_calib.prediction.strain_range import strain_range_table
 from mpam_calib.report.view import CalibrationView, Convergence
 from mpam_calib.run.folder import versions
 from mpam_calib.run.observed import in_kpa, observed_readings
+from mpam_calib.run.provenance import provenance
 from mpam_calib.specimen.oddities import oddities, stroke_stray
 from mpam_calib.specimen.recording import Loops
 from mpam_calib.specimen.summary import reading_noise
@@ -32,11 +33,6 @@ from mpam_calib.units import KPA
 Array = NDArray[np.float64]
 
 NOT_PHYSICS = (WHITE, CORRELATED, TIME, GROWTH, FREEDOM, SMOOTH, ROUGH, NOISE, MISFIT, CONTRACTION_SD)
-PROVENANCE = {
-    "reconstructed": "These data are reconstructed from printed tables, not measured.",
-    "synthetic": "These data are synthetic: a simulation made them, not a rig.",
-    "digitised": "These data were digitised from a printed figure.",
-}
 
 
 def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
@@ -86,7 +82,7 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
             columns=["kind", "file", "rows"],
         ),
         warnings=_warnings(calibration),
-        provenance=_provenance(calibration),
+        provenance=provenance(specimen),
         remainder=remainder,
         noise=noise,
         reading_noise=math.nan if specimen.loops is None else reading_noise(specimen.loops),
@@ -105,12 +101,6 @@ def _curves_end(model: Model) -> float:
     if model.setting is None:
         return math.nan
     return float(contraction_grid(model, max(model.blueprint.reach))[-1])
-
-
-def _provenance(calibration: Calibration) -> str:
-    specimen = calibration.specimen
-    words = " ".join([specimen.name, *(f.name for f in specimen.files)]).lower()
-    return next((sentence for word, sentence in PROVENANCE.items() if word in words), "")
 
 
 def _headline(calibration: Calibration) -> list[str]:
