@@ -10,7 +10,8 @@ import pytest
 from criticism.test_hypotheses import problem_of, specimen_of
 
 from mpam_calib.model.effect import effect
-from mpam_calib.report.diagnosis import BENT, FORMS, _alternatives, _causes, _next, _unproven
+from mpam_calib.report.diagnosis import BENT, FORMS, _alternatives, _causes
+from mpam_calib.report.diagnosis_lead import _next, _unproven
 from mpam_calib.report.page import DataTable, Notice, Text
 
 HOLDS = {

@@ -1,0 +1,134 @@
+"""The first screen of a diagnosis: what it comes to, how far to go by it, and what to do next."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from markupsafe import Markup
+
+from mpam_calib.model.effect import effect
+from mpam_calib.report import wording
+from mpam_calib.report.numbers import probability, significant
+from mpam_calib.report.page import Block, Headline, KeyNumber, Notice, Numbers, Verdict
+from mpam_calib.report.unremoved import unremoved
+from mpam_calib.specimen.recording import Specimen
+
+LEVELS: dict[str, Literal["good", "caution", "bad"]] = {
+    "adequate": "good",
+    "named": "caution",
+    "ambiguous": "caution",
+    "unexplained": "bad",
+}
+SENTENCES = {
+    "adequate": "The declared simulation leaves nothing but noise: these data show no fault in it.",
+    "named": "The declared simulation is wrong, and what is wrong has a name.",
+    "ambiguous": "The declared simulation is wrong, and these data cannot tell several causes apart.",
+    "unexplained": "The declared simulation is wrong in a way that no known set of causes removes.",
+}
+
+COVERED = 0.75
+"""Share of left-out readings below which 90 % bands are too narrow to go by."""
+
+
+def _next(causes: list[dict[str, Any]]) -> list[Block]:
+    """What to do with the extended model, where it holds anything new."""
+    words = (
+        "Next: <code>mpam-calib calibrate RUN/extended -o RUN_extended</code> fits the simulation with these "
+        "causes in it (RUN: the folder of this page)."
+    )
+    return [Notice(Markup(words))] if causes else []
+
+
+def _noise(content: dict[str, Any]) -> str:
+    if not content["noise_assumed"]:
+        return "of one reading"
+    return "of one reading, assumed: too few readings tell it, and no force_sd_N is declared"
+
+
+def first_screen(content: dict[str, Any], specimen: Specimen) -> list[Block]:
+    """Headline, verdict with its reasons, key numbers, what to beware of; ``content`` is diagnosis.json's."""
+    word = content["verdict"]
+    lead: list[Block] = [
+        Headline(SENTENCES[word]),
+        Verdict(_verdict_sentence(content), LEVELS[word], _reasons(content)),
+        Numbers(
+            [
+                KeyNumber("Misfit before", significant(content["misfit_before_N"]), "N", "", "beyond noise"),
+                KeyNumber("Misfit after", significant(content["misfit_after_N"]), "N", "", "beyond noise"),
+                KeyNumber("Noise", significant(content["noise_N"]), "N", "", _noise(content)),
+            ]
+        ),
+    ]
+    notices = (*_assumed(content), *_unproven(content), *wording.left_aside(specimen, "search"))
+    lead += [Notice(text) for text in notices]
+    return [*lead, *_next(content["causes"])]
+
+
+def _verdict_sentence(content: dict[str, Any]) -> str:
+    titles = ", ".join(effect(c["id"]).title.lower() for c in content["causes"])
+    if content["verdict"] == "adequate":
+        return "Adequate."
+    if not titles:
+        return f"{content['verdict'].capitalize()}: no cause stands by itself."
+    return f"{content['verdict'].capitalize()}: {titles}."
+
+
+def _reasons(content: dict[str, Any]) -> list[str]:
+    reasons = [
+        f"{effect(c['id']).title}: {effect(c['id']).sentence} (probability {probability(c['probability'])})"
+        for c in content["causes"]
+    ]
+    if content["verdict"] == "unexplained":
+        reasons += unremoved(content)
+    reasons += [
+        f"{effect(c['id']).title} stays inside twice its declared uncertainty"
+        for c in content["causes"]
+        if c["within_declared_uncertainty"]
+    ]
+    return reasons
+
+
+def _assumed(content: dict[str, Any]) -> list[str]:
+    """What is to be known of a cause whose size goes with strands that nobody declared."""
+    if (braid := content["assumed_braid"]) is None:
+        return []
+    titles = [effect(c["id"]).title.lower() for c in content["causes"] if effect(c["id"]).needs_braid]
+    strands = f"{braid['n']} nylon strands of {braid['R_br_mm']:g} mm radius and {braid['E_br_GPa']:g} GPa"
+    return [
+        f"specimen.toml has no [braid]. That there is {' and '.join(titles)} is told by how the force goes "
+        f"with pressure and contraction; its size is stated for {strands}, and is another for others. "
+        "Declare your sleeve to have its size."
+    ]
+
+
+def _unproven(content: dict[str, Any]) -> list[str]:
+    """What readings that the fit never saw say against the causes, if anything."""
+    gain = content["gain"]
+    if gain is None:
+        return []
+    which = {"cycle": "cycles", "pressure": "pressure levels"}[gain["held_out"]]
+    if against := _against(gain, "named", "elpd_gain_named", "these"):
+        return [
+            f"Readings of whole {which} that were left out speak against this result: {against}. "
+            "Make the measurement that tells the causes apart before you rely on them."
+        ]
+    if against := _against(gain, "after", "elpd_gain", "such"):
+        return [
+            f"With whole {which} left out the search may settle on other causes, or on other forms of them, "
+            f"that do not hold in those: {against}. The causes named here, fitted to the same rows, do: "
+            f"their error is {significant(gain['rmse_named_N'])} N."
+        ]
+    return []
+
+
+def _against(gain: dict[str, Any], which: str, elpd: str, such: str) -> str:
+    """What left-out readings say against one of the two kinds of causes, if anything."""
+    before, after = (significant(gain[f"rmse_{when}_N"]) for when in ("before", which))
+    against = []
+    if gain[f"rmse_{which}_N"] >= gain["rmse_before_N"]:
+        against.append(f"their error is {after} N with {such} causes and {before} N without")
+    if gain[elpd] < 0.0:
+        against.append(f"they are less probable with {such} causes than without")
+    if gain[f"coverage90_{which}"] < COVERED:
+        against.append(f"{100.0 * gain[f'coverage90_{which}']:.0f} % of them lie in the 90 % bands")
+    return "; ".join(against)
