@@ -122,12 +122,15 @@ def _unproven(content: dict[str, Any]) -> list[str]:
 
 
 def _against(gain: dict[str, Any], which: str, elpd: str, such: str) -> str:
-    """What left-out readings say against one of the two kinds of causes, if anything."""
+    """What left-out readings say against one of the two kinds of causes, if anything.
+
+    Nothing by figures that print alike, nor by a loss of probability within its standard error.
+    """
     before, after = (significant(gain[f"rmse_{when}_N"]) for when in ("before", which))
     against = []
-    if gain[f"rmse_{which}_N"] >= gain["rmse_before_N"]:
+    if gain[f"rmse_{which}_N"] > gain["rmse_before_N"] and after != before:
         against.append(f"their error is {after} N with {such} causes and {before} N without")
-    if gain[elpd] < 0.0:
+    if gain[elpd] < -gain[f"{elpd}_se"]:
         against.append(f"they are less probable with {such} causes than without")
     if gain[f"coverage90_{which}"] < COVERED:
         against.append(f"{100.0 * gain[f'coverage90_{which}']:.0f} % of them lie in the 90 % bands")

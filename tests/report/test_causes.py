@@ -20,7 +20,9 @@ HOLDS = {
     "rmse_after_N": 1.0,
     "rmse_named_N": 0.9,
     "elpd_gain": 80.0,
+    "elpd_gain_se": 2.0,
     "elpd_gain_named": 90.0,
+    "elpd_gain_named_se": 2.0,
     "coverage90_after": 0.9,
     "coverage90_named": 0.9,
 }
@@ -57,6 +59,21 @@ def test_left_out_readings_against_what_a_fold_chose_by_itself(changed: dict[str
 
 def test_left_out_readings_that_say_nothing_against_them() -> None:
     assert _unproven({"gain": HOLDS}) == _unproven({"gain": None}) == []
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"elpd_gain_named": -0.3, "elpd_gain_named_se": 9.0},
+        {"elpd_gain": -0.3, "elpd_gain_se": 9.0},
+        {"rmse_named_N": 2.0001},
+        {"rmse_after_N": 2.0001},
+        {"rmse_named_N": 2.0},
+    ],
+)
+def test_left_out_readings_within_their_error_say_nothing(changed: dict[str, Any]) -> None:
+    """Nor do errors that would print alike."""
+    assert _unproven({"gain": HOLDS | changed}) == []
 
 
 @pytest.mark.parametrize("form", ["", "bent"])
