@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,9 @@ from mpam_calib.report.page import (
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import KPA
 
+LIMITED = ("adequate", "named")
+"""Verdicts beside which no structure is left that would pass for a further effect."""
+
 SETTLED = 0.95
 """Probability above which a cause's equation is not said to be open."""
 
@@ -48,15 +52,15 @@ BENT = (
 
 def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen) -> Page:
     """The page for one diagnosis; ``content`` is that of ``diagnosis.json``."""
-    causes, parameters = content["causes"], _parameters(found)
+    causes, parameters, tested = content["causes"], _parameters(found), found.candidates.tested
     lead = first_screen(content, specimen)
     sections = [
         Section("Misfit budget", _budget(found, content)),
         Section("Where the misfit shows", _structure(content)),
         Section("Causes", _causes(causes, parameters)),
         *(
-            [Section("What could hide unseen", _limits(content, parameters, specimen))]
-            if content["limits"]
+            [Section("What could hide unseen", _limits(content, parameters, specimen, tested))]
+            if content["verdict"] in LIMITED
             else []
         ),
         Section("What else could it be", _alternatives(content, found, specimen)),
@@ -206,8 +210,16 @@ def _alternatives(content: dict[str, Any], found: Diagnosis, specimen: Specimen)
     return [Text(text), DataTable(pd.DataFrame(rows), "Other sets of causes", {"probability": "{}"})]
 
 
-def _limits(content: dict[str, Any], parameters: dict[str, Parameter], specimen: Specimen) -> list[Block]:
-    """How large each effect could be without being seen."""
+def _limits(
+    content: dict[str, Any],
+    parameters: dict[str, Parameter],
+    specimen: Specimen,
+    tested: Iterable[str] = (),
+) -> list[Block]:
+    """How large each effect could be without being seen, and of which ``tested`` ones that is not told."""
+    without = _without_limit(content, tested)
+    if not content["limits"]:
+        return without or [Text("No further effect was looked for.")]
     found = "Beside the causes named nothing was found" if content["causes"] else "Nothing was found"
     text = (
         f"{found}; that is not to say that nothing is there. Each effect by itself could have any "
@@ -240,7 +252,21 @@ def _limits(content: dict[str, Any], parameters: dict[str, Parameter], specimen:
         for name, band in limit["parameters"].items()
     ]
     formats = dict.fromkeys(["5 %", "95 %"], "{}")
-    return [Text(text), DataTable(pd.DataFrame(rows), "Sizes that these data leave room for", formats)]
+    table = DataTable(pd.DataFrame(rows), "Sizes that these data leave room for", formats)
+    return [Text(text), table, *without]
+
+
+def _without_limit(content: dict[str, Any], tested: Iterable[str]) -> list[Block]:
+    """Effects that could be there, and of which no size can be told that would be seen; often none."""
+    told = {known["id"] for key in ("causes", "limits", "not_tested") for known in content[key]}
+    if not (silent := [effect(e).title.lower() for e in tested if e not in told]):
+        return []
+    return [
+        Text(
+            f"No limit is stated for: {', '.join(silent)}. How large these are is not told by one number, or "
+            "none could be found for them; they may hide as well."
+        )
+    ]
 
 
 def _gain(content: dict[str, Any]) -> list[Block]:

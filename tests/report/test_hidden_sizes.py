@@ -9,7 +9,7 @@ from criticism.test_hypotheses import problem_of, specimen_of
 
 from mpam_calib.model.effect import effect
 from mpam_calib.model.priors import Parameter
-from mpam_calib.report.diagnosis import _limits
+from mpam_calib.report.diagnosis import _limits, _without_limit
 from mpam_calib.report.page import Text
 
 IDS = ("length_offset", "rig_compliance")
@@ -29,6 +29,7 @@ def test_a_band_of_either_sign_that_excludes_zero_is_pointed_out(
     offset, compliance = parameters
     content: dict[str, Any] = {
         "causes": [],
+        "not_tested": [],
         "limits": [
             {"id": "length_offset", "parameters": {offset: {"q05": low, "q95": 0.3}}},
             {"id": "rig_compliance", "parameters": {compliance: {"q05": 1e-6, "q95": 1e-4}}},
@@ -38,3 +39,23 @@ def test_a_band_of_either_sign_that_excludes_zero_is_pointed_out(
     assert isinstance(text, Text)
     assert ("length offset" in text.html) == named
     assert "compliance" not in text.html
+
+
+def test_effects_without_a_limit_are_named(parameters: dict[str, Parameter]) -> None:
+    """Not those that are causes, that have one, or that these data are silent on anyway."""
+    band = {"q05": -0.1, "q95": 0.3}
+    content: dict[str, Any] = {
+        "causes": [{"id": "dead_band"}],
+        "limits": [{"id": "length_offset", "parameters": {next(iter(parameters)): band}}],
+        "not_tested": [{"id": "creep", "why": "no clock"}],
+    }
+    tested = ("creep", "dead_band", "law_shape", "length_offset")
+    blocks = _limits(content, parameters, specimen_of("develop-null-006"), tested)
+    (line,) = _without_limit(content, tested)
+    assert isinstance(line, Text)
+    assert line.html.startswith(f"No limit is stated for: {effect('law_shape').title.lower()}. ")
+    assert blocks[-1] == line
+    assert _without_limit(content, tested[:2]) == []
+    # Also where no effect at all has one.
+    (alone,) = _limits(content | {"limits": []}, parameters, specimen_of("develop-null-006"), tested)
+    assert isinstance(alone, Text) and "length offset" in alone.html
