@@ -130,6 +130,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
     verdict, budget, gain = diagnosis.verdict, diagnosis.budget, diagnosis.gain
     content: dict[str, Any] = {
         "verdict": verdict.word,
+        "probability": _round(verdict.probabilities.get(verdict.standing, 0.0)),
         "causes": [_cause(diagnosis, e, seed) for e in diagnosis.causes],
         "alternatives": [{"ids": sorted(s), "probability": _round(p)} for s, p in verdict.others().items()],
         "not_tested": [{"id": i, "why": why} for i, why in diagnosis.not_tested],

@@ -10,7 +10,7 @@ from mpam_calib.model.effect import effect
 from mpam_calib.report import wording
 from mpam_calib.report.numbers import probability, significant
 from mpam_calib.report.page import Block, Headline, KeyNumber, Notice, Numbers, Verdict
-from mpam_calib.report.unremoved import unremoved
+from mpam_calib.report.unremoved import faults_in_readings, only_recording, unremoved
 from mpam_calib.specimen.recording import Specimen
 
 LEVELS: dict[str, Literal["good", "caution", "bad"]] = {
@@ -25,6 +25,11 @@ SENTENCES = {
     "ambiguous": "The declared simulation is wrong, and these data cannot tell several causes apart.",
     "unexplained": "The declared simulation is wrong in a way that no known set of causes removes.",
 }
+
+RECORDING = (
+    "The recording {} at fault: before that is put right nothing can be said of the declared simulation."
+)
+DOUBTED = "No fault is shown beyond doubt, but {}: see “What else could it be”."
 
 COVERED = 0.75
 """Share of left-out readings below which 90 % bands are too narrow to go by."""
@@ -47,10 +52,9 @@ def _noise(content: dict[str, Any]) -> str:
 
 def first_screen(content: dict[str, Any], specimen: Specimen) -> list[Block]:
     """Headline, verdict with its reasons, key numbers, what to beware of; ``content`` is diagnosis.json's."""
-    word = content["verdict"]
     lead: list[Block] = [
-        Headline(SENTENCES[word]),
-        Verdict(_verdict_sentence(content), LEVELS[word], _reasons(content)),
+        Headline(_headline(content)),
+        _verdict(content),
         Numbers(
             [
                 KeyNumber("Misfit before", significant(content["misfit_before_N"]), "N", "", "beyond noise"),
@@ -64,10 +68,53 @@ def first_screen(content: dict[str, Any], specimen: Specimen) -> list[Block]:
     return [*lead, *_next(content["causes"])]
 
 
+def _headline(content: dict[str, Any]) -> str:
+    word = content["verdict"]
+    if word == "adequate" and (rival := _likelier(content)):
+        return DOUBTED.format(_rivalry(rival, content["probability"]))
+    if word == "unexplained" and only_recording(content):
+        return RECORDING.format(_sure_of_fault(content))
+    return SENTENCES[word]
+
+
+def _sure_of_fault(content: dict[str, Any]) -> str:
+    """A load cell that explains the readings only nearly as well as the simulation is no sure fault."""
+    if faults_in_readings(content) or content["load_cell"]["nats"] > 0.0:
+        return "is"
+    return "may be"
+
+
+def _likelier(content: dict[str, Any]) -> dict[str, Any] | None:
+    """The likeliest alternative, where it is more probable than the set that is reported."""
+    first = max(content["alternatives"], key=lambda a: float(a["probability"]), default=None)
+    return first if first is not None and first["probability"] > content["probability"] else None
+
+
+def _rivalry(rival: dict[str, Any], none: float) -> str:
+    """How much more probable a set of causes is than none."""
+    titles = [effect(e).title.lower() for e in rival["ids"]]
+    names = f"{' and '.join(titles)} {'together are' if len(titles) > 1 else 'is'}"
+    if none <= 0.0:
+        return f"{names} far more probable than none"
+    return f"{names} {significant(rival['probability'] / none, 2)} times as probable as none"
+
+
+def _verdict(content: dict[str, Any]) -> Verdict:
+    """Green only where nothing found is more probable than that there is no fault."""
+    word, reasons = content["verdict"], _reasons(content)
+    if word == "adequate" and (rival := _likelier(content)):
+        said = f"{probability(rival['probability'])}, of no cause {probability(content['probability'])}"
+        titles = " and ".join(effect(e).title.lower() for e in rival["ids"])
+        return Verdict("Adequate, with a doubt.", "caution", [f"probability of {titles}: {said}", *reasons])
+    return Verdict(_verdict_sentence(content), LEVELS[word], reasons)
+
+
 def _verdict_sentence(content: dict[str, Any]) -> str:
     titles = ", ".join(effect(c["id"]).title.lower() for c in content["causes"])
     if content["verdict"] == "adequate":
         return "Adequate."
+    if content["verdict"] == "unexplained" and only_recording(content):
+        return f"Unexplained: the recording {_sure_of_fault(content)} at fault."
     if not titles:
         return f"{content['verdict'].capitalize()}: no cause stands by itself."
     return f"{content['verdict'].capitalize()}: {titles}."

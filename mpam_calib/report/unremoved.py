@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mpam_calib.criticism.unexplained.load_cell import FAULT, LATE, RESCALED, ZEROED
+from mpam_calib.criticism.verdict import NOISE_SIZE
 from mpam_calib.report.numbers import significant
 
 CELL_FAULTS = {
@@ -44,6 +45,22 @@ FAULTS = {
     "step_N": "forces are recorded in steps of {} N, coarser than their noise: use a finer range",
 }
 """What is said of a fault of so many newtons, and where to look for it."""
+
+
+def faults_in_readings(content: dict[str, Any]) -> bool:
+    """Whether the raw readings show a fault by themselves."""
+    return any(content[name] > 0.0 for name in ("saturated_share", *FAULTS))
+
+
+def only_recording(content: dict[str, Any]) -> bool:
+    """Whether a fault of the recording is all that was found: nothing of the simulation was shown.
+
+    No cause, no trace, and no misfit that a reading's noise would not hide.
+    """
+    fault = faults_in_readings(content) or content["load_cell"] is not None
+    hidden = content["misfit_before_N"] < NOISE_SIZE * content["noise_N"]
+    small = content["remainder_N"] == 0.0 or hidden
+    return fault and small and not content["causes"] and content["trace"] is None
 
 
 def unremoved(content: dict[str, Any]) -> list[str]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from mpam_calib.criticism.unexplained.load_cell import FAULT, LATE
 from mpam_calib.model.effect import effect
-from mpam_calib.report.unremoved import CELL_FAULTS, unremoved
+from mpam_calib.report.diagnosis_lead import _headline, _verdict_sentence
+from mpam_calib.report.unremoved import CELL_FAULTS, only_recording, unremoved
 
 FAULTLESS = {
     **dict.fromkeys(
@@ -64,3 +67,28 @@ def test_what_the_residuals_depend_on_is_told_beside_a_remainder() -> None:
     (text,) = unremoved(FAULTLESS | trace)
     assert "still depends on branch (0.0456 N)" in text
     assert len(unremoved(FAULTLESS | trace | {"remainder_N": 1.234})) == 2
+
+
+@pytest.mark.parametrize(
+    ("found", "only"),
+    [
+        ({"hum_N": 2.0}, True),
+        ({"saturated_share": 0.02}, True),
+        ({"load_cell": {"fault": FAULT, "nats": 9.0, "parameters": {}}}, True),
+        ({"step_N": 0.5, "remainder_N": 0.3, "misfit_before_N": 0.4}, True),  # the noise would hide it
+        ({"step_N": 0.5, "remainder_N": 0.3, "misfit_before_N": 2.0}, False),
+        ({"hum_N": 2.0, "trace": {"against": "branch", "rms_N": 0.4}}, False),
+        ({"hum_N": 2.0, "causes": [{"id": "creep"}]}, False),
+        ({"remainder_N": 0.3}, False),
+        ({}, False),
+    ],
+)
+def test_a_recording_at_fault_is_not_the_simulation_s_fault(found: dict[str, Any], only: bool) -> None:
+    content = FAULTLESS | {"verdict": "unexplained", "causes": [], "misfit_before_N": 2.0, "noise_N": 1.0}
+    content |= {"alternatives": [], "probability": 0.9} | found
+    assert only_recording(content) == only
+    assert _headline(content).startswith("The recording is at fault" if only else "The declared simulation")
+    if content["load_cell"]:
+        doubtful = content | {"load_cell": content["load_cell"] | {"nats": -2.0}}
+        assert _headline(doubtful).startswith("The recording may be at fault")
+    assert _verdict_sentence(content).endswith("the recording is at fault.") == only
