@@ -106,14 +106,17 @@ def choices_section(odds: pd.DataFrame, levels: pd.DataFrame) -> Section:
     """Orders, laws and levels in words, with the figures behind them."""
     blocks: list[Block] = [Text(s) for choice in WORDS for s in choice_sentences(odds, choice)]
     blocks += [Text(s) for model in WHOSE if (s := level_sentence(levels, model))]
-    blocks.append(
-        DataTable(
-            odds.assign(probability=[probability(p) for p in odds["probability"]]),
-            "Each choice by itself (log evidence in nats)",
-            {"log_evidence_declared": "{:.2f}", "log_evidence": "{:.2f}", "probability": "{}"},
-            collapse=True,
+    # A choice of one value was not made.
+    table = odds[odds.groupby("choice")["value"].transform("size") > 1]
+    if len(table):
+        blocks.append(
+            DataTable(
+                table.assign(probability=[probability(p) for p in table["probability"]]),
+                "Each choice by itself (log evidence in nats)",
+                {"log_evidence_declared": "{:.2f}", "log_evidence": "{:.2f}", "probability": "{}"},
+                collapse=True,
+            )
         )
-    )
     if len(levels):
         formats = {"pressure_kPa": "{:.0f}", "inside90": "{:.2f}"}
         formats |= dict.fromkeys(("rmse_N", "bias_N", "bias_sd_N"), "{:.3g}")

@@ -34,7 +34,7 @@ ASSUMED_NOISE = (
 )
 AS_DECLARED = Markup(
     "Effects are as declared ({}) in every model of this ranking. One that is missing, such as a dead-band, "
-    "shows up here as another order or strain: run <code>mpam-calib diagnose</code> first."
+    "shows up here as another {}: run <code>mpam-calib diagnose</code> first."
 )
 
 
@@ -179,11 +179,12 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
         reasons.append("the noise of a reading is only assumed, and all probabilities with it")
     if uncertain := declared_sds(specimen):
         reasons.append(f"declared uncertainties ({', '.join(uncertain)}) are not in the evidence")
+    mistaken = " or ".join([c for c in ("order", "strain") if c in compared(models)] or compared(models))
     good = sure and agrees and not uncertain and found.noise_guess is None
     lead: list[Block] = [
         Headline(selection_sentence(models)),
         Verdict("Model selection", "good" if good else "caution", reasons),
-        Notice(AS_DECLARED.format(", ".join(specimen.simulation.effects) or "none")),
+        Notice(AS_DECLARED.format(", ".join(specimen.simulation.effects) or "none", mistaken)),
     ]
     lead += [Notice(text) for text in [*left_aside(specimen, "ranking"), *not_in_evidence(specimen)]]
     if found.noise_guess is not None:

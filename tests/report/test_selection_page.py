@@ -134,6 +134,12 @@ def test_only_what_was_compared_is_said_to_be_asked_for() -> None:
     (verdict,) = (b for b in page(table).lead if isinstance(b, Verdict))
     alike = "not compared, as all models have the same: strain (stretch), order (2), law (constant)"
     assert alike in verdict.reasons
+    shown = page(table)
+    told = " ".join(b.html for b in shown.lead if isinstance(b, Notice))
+    assert "shows up here as another kinematics or friction:" in told
+    tables = [b for s in shown.sections for b in s.blocks if isinstance(b, DataTable)]
+    (odds_,) = (t.frame for t in tables if "choice" in t.frame)
+    assert set(odds_["choice"]) == {"kinematics", "friction"}
     every = table.assign(strain=["stretch", "engineering"], order=[1, 2], law=["constant", "linear"])
     assert (
         selection_sentence(every) == "The data ask for constant_thickness, stretch, M = 1, constant, coulomb."
@@ -149,6 +155,7 @@ def test_one_model_alone_is_no_choice() -> None:
     assert headline.html.startswith("Nothing could be chosen: inextensible_braid, stretch, M = 1")
     assert verdict.level == "caution"
     assert not any("probability" in reason for reason in verdict.reasons)
+    assert "Each choice by itself" not in shown.render()
 
 
 def test_no_probability_is_certain() -> None:
