@@ -127,11 +127,13 @@ def _finish(found: Search, width: int, tell: Callable[[float], None]) -> None:
         parts = [frozenset(p) for s in leaders for p in combinations(sorted(s), max(len(s) - 1, 0))]
         for size in range(len(SIZES)):
             found.refit_all((effects, size) for effects in [*parts, *leaders])
-        found.polish([*parts, *leaders])
-        found.even_out([*parts, *leaders])
+        # In folds it is the first that counts.
+        looked_at = [*parts, *leaders] if width >= WIDTH else [*parts[: len(leaders[0])], leaders[0]]
+        found.polish(looked_at)
+        found.even_out(looked_at)
     first = found.sets[0]
     found.refit_all(
         (further, size) for further in found.with_one_more(first) for size in {0, found.best_size(first)}
     )
-    found.doubt(DOUBTED * width)
+    found.doubt(DOUBTED * width, further=width >= WIDTH)
     found.over_forms(further=width >= WIDTH)

@@ -217,17 +217,19 @@ class Search:
         near = [s for s in self.sets[:POLISHED] if self.score(s) > self.score(self.sets[0]) - NEAR]
         self.polish_all((s, self.best_size(s)) for s in near)
 
-    def doubt(self, leading: int) -> None:
-        """Refit so many leading sets, and the best of each number of effects, with a doubt of their forms."""
+    def doubt(self, leading: int, further: bool = True) -> None:
+        """Refit so many leading sets, and the best of each number of effects, with a doubt of their forms.
+
+        And those with one ``further`` cause, wherever they are: what could hide though nothing was found?
+        """
         sets, count = self.sets, range(LARGEST + 1)
         chosen = {
             *sets[:leading],
             *(s for k in count for s in [q for q in sets if len(q) == k][:DOUBTED_EACH]),
         }
         chosen |= {frozenset(p) for s in sets[:LEADERS] for p in combinations(sorted(s), max(len(s) - 1, 0))}
-        # What could hide though nothing was found, or nothing further?
-        bases = [s for s in (frozenset[str](), sets[0]) if s in sets[:LEADERS]]
-        chosen |= {further for base in bases for further in self.with_one_more(base)}
+        bases = [s for s in (frozenset[str](), sets[0]) if s in sets[:LEADERS]] if further else []
+        chosen |= {larger for base in bases for larger in self.with_one_more(base)}
         keys = [key for key in self.fits if key[0] in chosen]
         rest = [key for key in keys if key[1] != self.best_size(key[0])]
         best = [key for key in keys if key[1] == self.best_size(key[0])]
