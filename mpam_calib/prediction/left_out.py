@@ -56,8 +56,8 @@ def levels_left_out(specimen: Specimen, target: Collapsed, draws: Draws, seed: i
     """A row of COLUMNS for each level, the lowest and the highest extrapolated.
 
     ``inside90``: share of the level's readings inside the 90 % band that all other levels give a new reading
-    there; ``bias_N`` their mean above the prediction, ``bias_sd_N`` the sd that the prediction gives it, one
-    reading's noise left out. Empty where there are fewer than FEWEST levels, or moduli of each level's own.
+    there; ``bias_N`` their mean above the prediction, ``bias_sd_N`` the sd that the prediction gives it, the
+    readings' noise included. Empty where there are fewer than FEWEST levels, or moduli of each level's own.
     """
     return pd.DataFrame(_rows(specimen, target, draws, seed), columns=COLUMNS)
 
@@ -91,7 +91,7 @@ def _rows(specimen: Specimen, target: Collapsed, draws: Draws, seed: int) -> lis
         rows.append(
             [
                 round(float(levels[level]) / KPA, 3), len(miss), float(np.sqrt(np.mean(miss**2))),
-                float(miss.mean()), float(force.mean(axis=1).std()),
+                float(miss.mean()), float(seen.mean(axis=1).std()),
                 float(np.mean((held.force >= low) & (held.force <= high))),
                 bool(level in (0, len(levels) - 1)),
             ]

@@ -22,17 +22,18 @@ class ReadingNoise:
     """Noise under N draws: ``values`` name → (N, 1), the force (N) at which a growth of one counts.
 
     A reading may be the mean of ``averaged`` of the rig's, one number or one for each place (n,): that is
-    less white noise, but as much of what lasts.
+    less white noise, and of what lasts the share ``lasting`` (N, n) of its sd.
     """
 
     values: Mapping[str, Array]
     force_scale: float
     averaged: Array | float = 1.0
+    lasting: Array | float = 1.0
 
     def sd(self, force: Array) -> Array:
         """Standard deviation (N, ...), N, at forces (N, ...); of heavy-tailed noise, its scale."""
         white = self._white(force.ndim)
-        correlated = self._shaped(CORRELATED, force.ndim) if CORRELATED in self.values else 0.0
+        correlated = self._correlated(force.ndim) if CORRELATED in self.values else 0.0
         return np.asarray(np.hypot(white, correlated) * self._growth(force))
 
     def draw(self, force: Array, rng: np.random.Generator) -> Array:
@@ -44,11 +45,14 @@ class ReadingNoise:
         tailed = np.clip(normal / np.sqrt(rng.chisquare(dof) / dof), -FURTHEST, FURTHEST)
         white = self._white(force.ndim) * tailed
         if CORRELATED in self.values:
-            white = white + self._shaped(CORRELATED, force.ndim) * rng.standard_normal(force.shape)
+            white = white + self._correlated(force.ndim) * rng.standard_normal(force.shape)
         return np.asarray(white * self._growth(force))
 
     def _white(self, dimensions: int) -> Array:
         return np.asarray(self._shaped(WHITE, dimensions) / np.sqrt(self.averaged))
+
+    def _correlated(self, dimensions: int) -> Array:
+        return np.asarray(self._shaped(CORRELATED, dimensions) * self.lasting)
 
     def _growth(self, force: Array) -> Array | float:
         if GROWTH not in self.values:

@@ -30,6 +30,7 @@ def overruled_slack(view: CalibrationView) -> Limit | None:
         return None
     floor = max(float(slack["force_N"].median()), 0.0)
     pull, sd = _foreseen(slack)
+    sd = np.hypot(sd, np.nan_to_num(view.reading_noise))
     wrong = pull > floor + BELIEVED_SDS * sd
     if not wrong.any():
         return None

@@ -110,7 +110,8 @@ def held_left_out(rows: pd.DataFrame, extrapolated: bool) -> Held | None:
     if rows.empty:
         return None
     rows = rows[rows["extrapolated"].astype(bool) == extrapolated]
-    return _held(rows["inside90"].mean(), rows["readings"].sum())
+    readings = rows["readings"].sum()
+    return _held((rows["inside90"] * rows["readings"]).sum() / max(readings, 1), readings)
 
 
 def held_along(view: CalibrationView) -> Held | None:

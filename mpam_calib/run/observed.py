@@ -1,19 +1,22 @@
-"""Reduced readings as a calibration's report shows them: beside the fit, and with the bands of new ones."""
+"""Reduced readings as a calibration's report shows them: beside the fit, with bands of others like them."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from mpam_calib.calibration import Calibration
-from mpam_calib.model.noise import WHITE
+from mpam_calib.model.noise import TIME, WHITE
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import ROUGH
 from mpam_calib.model.tensile import MISFIT, NOISE
 from mpam_calib.posterior.density.target import predict_force
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.posterior.likelihood.bins import LoopBins
+from mpam_calib.posterior.likelihood.covariance import lasting_share
 from mpam_calib.posterior.likelihood.points import KINDS, Points
 from mpam_calib.prediction.curves import BATCH_CELLS
 from mpam_calib.prediction.fitted import fitted_force, fitted_stress, noise_of
@@ -72,7 +75,7 @@ def _bins_frame(bins: LoopBins, calibration: Calibration, draws: Draws) -> tuple
     fitted, left = np.mean([fitted_force(calibration.model, draws, place) for place in places], axis=0)
     rough = float(np.mean(draws.values[ROUGH] ** 2)) if ROUGH in draws.values else 0.0
     frame = _frame("loops", middle, bins.force, bins.slack, calibration)
-    low, high = _bands(calibration, places)
+    low, high = _bands(calibration, places, bins)
     frame = frame.assign(
         stroke=bins.segment, time_s=middle.time, cycle=middle.cycle,
         fitted_N=fitted, low_N=low, high_N=high,
@@ -103,25 +106,37 @@ def _points_frames(
     return found
 
 
-def _bands(calibration: Calibration, places: list[Readings]) -> tuple[Array, Array]:
-    """Ends (n,), N, of the 90 % band of a new reading where, and at the pressure at which, each was made.
+def _bands(
+    calibration: Calibration, places: list[Readings], bins: LoopBins | None = None
+) -> tuple[Array, Array]:
+    """Ends (n,), N, of the 90 % band of another reading where, and at the pressure at which, each was made.
 
-    Each reading is a mean over its places.
+    Each is a mean over its places; one of ``bins`` has the noise of a mean of its rows.
     """
     model, draws = calibration.model, calibration.draws.thin(BAND_DRAWS)
     assert model.setting is not None
-    noise = ReadingNoise(draws.values, model.setting.force_scale)
     rng = np.random.default_rng([calibration.seed, 12])
     size = max(1, BATCH_CELLS // len(draws))
     ends = []
     for i in range(0, len(places[0]), size):
-        some = [place.take(slice(i, i + size)) for place in places]
+        part = slice(i, i + size)
+        some = [place.take(part) for place in places]
         force = np.mean([predict_force(model, draws.values, draws.eta, place) for place in some], axis=0)
         if ROUGH in draws.values:
             force = force + draws.values[ROUGH] * rng.standard_normal(force.shape)
+        noise = ReadingNoise(draws.values, model.setting.force_scale)
+        if bins is not None:
+            noise = _noise_of_means(noise, bins, part)
         ends.append(np.quantile(force + noise.draw(force, rng), [0.05, 0.95], axis=0))
     low, high = np.concatenate(ends, axis=1)
     return low, high
+
+
+def _noise_of_means(noise: ReadingNoise, bins: LoopBins, part: slice) -> ReadingNoise:
+    """That of some bins: all their means would lie in bands of single readings, however wrong the fit."""
+    rows, dt = bins.count[part], bins.dt[bins.segment[part]]
+    lasting = lasting_share(rows, dt, noise.values[TIME][:, 0]) if TIME in noise.values else 1.0
+    return replace(noise, averaged=rows * bins.averaged, lasting=lasting)
 
 
 def _frame(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from mpam_calib.posterior.likelihood.covariance import lasting_share
 from mpam_calib.prediction.reading_noise import FURTHEST, ReadingNoise
 
 N = 40_000
@@ -35,6 +36,20 @@ def test_a_mean_of_readings_has_less_white_noise_alone() -> None:
     assert made.sd(np.zeros((N, 2)))[0] == pytest.approx(expected)
     tailed = draws(replace(noise(noise_sd_N=0.9, noise_dof=3.0), averaged=9.0))[:, 0]
     assert stats.kstest(tailed / 0.3, stats.t(3.0).cdf).pvalue > 1e-3
+
+
+def test_of_noise_that_lasts_a_mean_keeps_what_its_readings_share() -> None:
+    """Means of two and of forty readings, 0.1 s apart, of noise that lasts 0.5 s: reckoned and drawn."""
+    rows, dt, time = np.array([2.0, 40.0]), np.array([0.1, 0.1]), 0.5
+    lasting = lasting_share(rows, dt, np.full(N, time))
+    apart = np.abs(np.subtract.outer(np.arange(40), np.arange(40))) * 0.1
+    kernel = np.exp(-apart / time)
+    expected = [np.sqrt(kernel[:2, :2].mean()), np.sqrt(kernel.mean())]
+    np.testing.assert_allclose(lasting[0], expected)
+    made = replace(noise(noise_sd_N=0.9, noise_corr_sd_N=0.4), averaged=rows, lasting=lasting)
+    assert draws(made).std(axis=0) == pytest.approx(
+        np.hypot(0.9 / np.sqrt(rows), 0.4 * np.array(expected)), rel=0.02
+    )
 
 
 def test_it_grows_with_the_force() -> None:

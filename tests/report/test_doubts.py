@@ -49,6 +49,13 @@ def test_slack_that_is_believed(sound: CalibrationView, pull: float, floor: floa
     assert doubts.overruled_slack(sound) is None
 
 
+def test_slack_is_judged_by_the_noise_of_a_reading(sound: CalibrationView) -> None:
+    """The band of a mean of many is narrow; some of its readings may be above the floor all the same."""
+    slack = with_slack(sound, 6.0)
+    assert doubts.overruled_slack(replace(slack, reading_noise=0.1)) is not None
+    assert doubts.overruled_slack(replace(slack, reading_noise=2.0)) is None
+
+
 @pytest.mark.parametrize(
     ("level", "stray", "told"),
     [

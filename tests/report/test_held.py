@@ -147,6 +147,16 @@ def test_levels_that_the_others_do_not_foresee(
         assert f"{100 * (inside[1] + inside[2]) / 2:.0f} % of its readings" in limits[0].sentence
 
 
+def test_a_stray_reading_of_its_own_level_counts_as_one(sound: CalibrationView) -> None:
+    left_out = left_out_levels((0.9, 0.92, 0.0, 0.9))
+    left_out["readings"] = [60, 60, 1, 60]
+    view = replace(sound, left_out=left_out)
+    found = held.held_between(view)
+    assert found is not None and found.readings == 61
+    assert found.share == pytest.approx(0.92 * 60 / 61)
+    assert held.between_levels(view) is None
+
+
 def test_levels_that_could_not_be_left_out_are_no_good_news(sound: CalibrationView) -> None:
     told = ("inner levels lie", "recorded pressures")
     assert not any(words in reason for reason in assess(sound).reasons for words in told)

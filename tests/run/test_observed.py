@@ -45,12 +45,16 @@ def observed(calibration: Calibration) -> pd.DataFrame:
 def test_the_band_of_a_reading_is_that_at_its_own_pressure(
     calibration: Calibration, observed: pd.DataFrame
 ) -> None:
-    """Wherever the pressure went, a true simulation's band of 90 % holds the reading, and is no wider."""
+    """Wherever the pressure went, a true simulation's band of 90 % holds the reading, and is no wider.
+
+    Each reading is a mean of two, and has the noise of such a mean.
+    """
     assert (observed["pressure_kPa"] / observed["level_kPa"] - 1.0).abs().max() > 0.03
     held = observed["force_N"].between(observed["low_N"], observed["high_N"])
-    assert held.mean() > 0.85
+    assert 0.83 < held.mean() < 0.98
     width = observed["high_N"] - observed["low_N"]
-    assert width.between(2.5 * NOISE_N, 5.0 * NOISE_N).all()
+    one = 2.0 * 1.645 * NOISE_N / np.sqrt(2.0)
+    assert 0.9 * one < width.median() < 1.3 * one
 
 
 def test_a_mean_of_readings_is_compared_with_the_mean_of_the_fit(

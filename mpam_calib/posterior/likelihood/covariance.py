@@ -204,6 +204,15 @@ def _of_means(rows: Array, log_rho: Array) -> tuple[Array, Array]:
     return series / rows, own
 
 
+def lasting_share(rows: Array, dt: Array, time: Array) -> Array:
+    """What means of rows (n,), ``dt`` (n,) s apart, keep of the sd of correlated noise, (B, n).
+
+    ``time`` (B,) is its time constant, s.
+    """
+    _, own = _of_means(rows, -dt / time[:, None])
+    return np.sqrt(own)
+
+
 def fast_noise_covariance(
     scatter: tuple[Array, int, Array, float], averaged: int, white: Array, correlated: Array, time: Array
 ) -> Array:
