@@ -15,6 +15,7 @@ from mpam_calib.criticism.fitting.fit import Fit
 from mpam_calib.criticism.fitting.predicted import beyond_noise
 from mpam_calib.criticism.fitting.refits import Set, best_of, ended, named_forms
 from mpam_calib.criticism.searching.searched import Search
+from mpam_calib.criticism.unexplained.repeat import raw_residual
 
 Array = NDArray[np.float64]
 
@@ -58,9 +59,21 @@ def misfit_budget(found: Search, causes: Set) -> Budget:
         before=float(np.sqrt(before)),
         after=float(np.sqrt(worth[causes])),
         remainder=remainder_rms(problem, fitted),
-        noise=problem.noise_level.total,
+        noise=_noise(problem, fitted),
         shares=shares,
     )
+
+
+def _noise(problem: Problem, fitted: Fit) -> float:
+    """A reading's noise (N): no more than all that the fit leaves of the raw readings.
+
+    What is periodic, a hum, passes for noise that lasts far longer than the windows that tell its size.
+    """
+    level = problem.noise_level
+    if problem.rows is None or level.growth > 0.0:
+        return level.total
+    residual = raw_residual(problem.rows, problem.blueprint.model_dump_json(), fitted)
+    return min(level.total, float(np.sqrt(np.mean(residual**2))))
 
 
 def _at_word(found: Search, causes: Set) -> dict[Set, float]:

@@ -103,7 +103,15 @@ def test_newtons_are_root_mean_squares_of_what_the_equations_leave(found: Search
         left = problem.force - fit(problem, forms, 0).force
         square = float(np.mean(left**2) - np.mean(np.diagonal(problem.noise)))
         assert told == pytest.approx(np.sqrt(max(square, 0.0)), abs=0.02 * budget.before)
-    assert budget.noise == problem.noise_level.total
+    assert budget.noise == pytest.approx(problem.noise_level.total, rel=0.05)
+
+
+def test_noise_is_no_more_than_all_that_is_left_of_the_readings(found: Search) -> None:
+    """Noise that is told from windows may be told as far larger: what is periodic seems to last."""
+    problem = found.problem
+    loud = replace(problem.noise_level, correlated=5.0 * problem.noise_level.total)
+    budget = misfit_budget(replace(found, problem=replace(problem, noise_level=loud)), CAUSES)
+    assert budget.noise == pytest.approx(problem.noise_level.total, rel=0.1)
 
 
 def test_the_remainder_is_what_smoothing_the_misfit_leaves_of_it(found: Search) -> None:

@@ -13,6 +13,7 @@ from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.data.rows import Rows
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.searching.search import search
+from mpam_calib.criticism.unexplained.faults import faults_of
 from mpam_calib.criticism.unexplained.hum import hum_rms
 from mpam_calib.criticism.verdict import judge
 
@@ -99,3 +100,12 @@ def test_the_verdict_on_a_rig_that_hums() -> None:
     assert verdict.word == "unexplained"
     assert verdict.standing == frozenset()
     assert verdict.faults.hum > 0.0
+
+
+def test_a_hum_far_below_the_noise_of_a_reading_is_none() -> None:
+    """Where there is next to no noise its prior says how much there may be, and rounding is what is left."""
+    problem = humming(2.0)
+    fitted = fit(problem, frozenset(), 0)
+    loud = replace(problem.noise_level, white=200.0 * problem.noise_level.total)
+    assert faults_of(problem, fitted).hum > 0.0
+    assert faults_of(replace(problem, noise_level=loud), fitted).hum == 0.0

@@ -19,6 +19,10 @@ from mpam_calib.model.noise import grown
 REPEAT_SIZE = 0.2
 """Fine structure that repeats, in a reading's noise, from which on it counts: it passes for noise itself."""
 
+NOTHING = 0.02
+"""A fault of less than this share of a reading's noise is none: readings nearly without noise have bursts of
+rounding."""
+
 
 @dataclass(frozen=True)
 class Faults:
@@ -52,12 +56,16 @@ def faults_of(problem: Problem, fitted: Fit) -> Faults:
     residual = raw_residual(rows, problem.blueprint.model_dump_json(), fitted)
     grows = grown(np.array(noise.growth), rows.force, problem.force_scale)
     repeating = repeating_rms(rows, residual)
+    # Tails that were declared are no bursts.
+    bursts = 0.0 if problem.blueprint.noise.robust else bursts_rms(rows, residual, grows)
+    hum = max(hum_rms(rows, residual), wave_rms(rows, residual))
+    chatter = chatter_rms(rows, residual, grows)
+    bursts, hum, chatter = (x if x > NOTHING * noise.total else 0.0 for x in (bursts, hum, chatter))
     return Faults(
         saturated=problem.saturated,
         repeating=repeating if repeating > REPEAT_SIZE * noise.total else 0.0,
-        # Tails that were declared are no bursts.
-        bursts=0.0 if problem.blueprint.noise.robust else bursts_rms(rows, residual, grows),
-        hum=max(hum_rms(rows, residual), wave_rms(rows, residual)),
+        bursts=bursts,
+        hum=hum,
         step=coarse_step(rows.force, noise.total),
-        chatter=chatter_rms(rows, residual, grows),
+        chatter=chatter,
     )
