@@ -23,17 +23,20 @@ def reproduce(
     """Recompute every table and number of the thesis and name its misprints."""
     from rich.console import Console
 
-    from mpam_calib.run.files import demand_folder
+    from mpam_calib.cli.warning import warn_unconverged
+    from mpam_calib.run.files import REPRODUCTION, demand_folder
     from mpam_calib.thesis.page import page
     from mpam_calib.thesis.posterior import MPAM1, MPAM1_STRAND, MPAM2, MuscleBands, missing
     from mpam_calib.thesis.reproduction import reproduce as recompute
 
-    demand_folder(out)
+    demand_folder(out, REPRODUCTION)
     runs = {MPAM1: mpam1, MPAM2: mpam2, MPAM1_STRAND: mpam1_strand}
     bands = {name: MuscleBands.read(name, run) for name, run in runs.items() if run is not None}
+    for run in filter(None, runs.values()):
+        warn_unconverged(run)
     result = recompute(seed)
     out.mkdir(parents=True, exist_ok=True)
-    result.ledger.write(out / "reproduction.csv")
+    result.ledger.write(out / REPRODUCTION)
     page(result, bands).write(out / "report.html")
     console = Console()
     console.print(result.ledger.summary(), soft_wrap=True)

@@ -17,18 +17,21 @@ from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 
 KEPT_FILE = "kept.json"
 """The mark of a finished diagnosis or selection, with the digest of each of its files."""
+REPRODUCTION = "reproduction.csv"
+"""The thesis recomputed."""
 CHECKPOINT, UNFINISHED = "checkpoint", "unfinished"
 """Where a calibration, and a diagnosis or selection, keep what an interruption leaves."""
 OWNERS = {
     SPECIMEN_FILE: "a specimen's folder",
     RUN_FILE: "a calibration's folder",
     KEPT_FILE: "a diagnosis's or selection's folder",
+    REPRODUCTION: "a reproduction's folder",
 }
 GENERIC = ("summary.csv", "bands.csv", "report.html")
 """Results whose names others use as well ..."""
 OURS = (
     RUN_FILE, KEPT_FILE, POSTERIOR, CHECKPOINT, UNFINISHED,
-    "diagnosis.json", "models.csv", "reproduction.csv",
+    "diagnosis.json", "models.csv", REPRODUCTION,
 )  # fmt: skip
 """... beside one of which they are ours, finished or not."""
 

@@ -27,7 +27,23 @@ JUMP, USUAL = 5.0, 0.99
 
 def odd_readings(loops: Loops, levels_Pa: Floats) -> list[str]:
     """Remarks on forces that hardly are the muscle's."""
-    return _at_a_limit(loops) + _zero_off(loops, levels_Pa) + _at_a_standstill(loops)
+    return [
+        *_mostly_pushing(loops),
+        *_at_a_limit(loops),
+        *_zero_off(loops, levels_Pa),
+        *_at_a_standstill(loops),
+    ]
+
+
+def _mostly_pushing(loops: Loops) -> list[str]:
+    """Most forces below 0, though the muscle pulls where it is long."""
+    median = float(np.median(loops.force_N))
+    if median >= 0.0:
+        return []
+    return [
+        f"loops: the median force is {median:.3g} N; was the load cell zeroed under load, or is the muscle "
+        "driven beyond its free contraction?"
+    ]
 
 
 def _at_a_limit(loops: Loops) -> list[str]:

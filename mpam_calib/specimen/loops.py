@@ -174,11 +174,14 @@ def censored_rows(frame: pd.DataFrame, floor_N: float | None) -> Bools:
 
 
 def _check_plausible(file: DataFile, frame: pd.DataFrame, geometry: Geometry) -> None:
-    held = "branch" in frame and bool(frame["branch"].isin([PRESSURISING, DEPRESSURISING]).any())
+    # Where the muscle is filled and emptied at held length it need not move.
+    strokes = np.ones(len(frame), dtype=bool)
+    if "branch" in frame and frame["branch"].isin([PRESSURISING, DEPRESSURISING]).any():
+        strokes = (frame["branch"].abs() == 1).to_numpy()
     rows = frame.index.to_numpy()
     displacement = frame["displacement_mm"].to_numpy()
     check_codes(file.label, frame)
-    check_displacement(file.label, displacement * MM, rows, geometry, held=held)
+    check_displacement(file.label, displacement * MM, rows, geometry, strokes)
     if "branch" not in frame:
         check_held_length(file.label, displacement, frame["pressure_kPa"].to_numpy(), rows)
     check_force(file.label, "loops", frame["force_N"].to_numpy(), displacement)

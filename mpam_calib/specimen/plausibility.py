@@ -141,14 +141,15 @@ def check_strain(label: str, strain: Floats, rows: Ints) -> None:
 
 
 def check_displacement(
-    label: str, displacement_m: Floats, rows: Ints, geometry: Geometry, *, held: bool
+    label: str, displacement_m: Floats, rows: Ints, geometry: Geometry, strokes: Bools
 ) -> None:
-    """Refuse a displacement that never moves (unless ``held`` on purpose), has few rows, another unit, or
-    is impossible."""
+    """Refuse a displacement that never moves in its ``strokes`` (n,), if any, has few rows there or another
+    unit, or is impossible anywhere."""
     column = "displacement_mm"
-    millimetres = displacement_m / MM
-    if not held:
-        if len(turning_points(displacement_m, turn_threshold(displacement_m))) < 2:
+    millimetres = displacement_m[strokes] / MM
+    if strokes.any():
+        way = displacement_m[strokes]
+        if len(turning_points(way, turn_threshold(way))) < 2:
             raise _unmoved(label, millimetres, LEAST_STROKE * geometry.L0_mm)
         largest = float(millimetres.max())
         if largest < LEAST_STROKE * geometry.L0_mm:

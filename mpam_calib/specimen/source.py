@@ -74,6 +74,10 @@ def data_files(source: TomlSource, declaration: Declaration) -> list[DataFile]:
             if "\0" in name:
                 raise fault(source, keys, f"{quoted(name)}", "a file's name")
             path = folder / name
+            if Path(name).is_absolute() or ".." in Path(name).parts:
+                # A copy of the specimen could not have it.
+                outside = f"a path from outside the specimen's folder ({quoted(name)})"
+                raise fault(source, keys, outside, "one that begins in it")
             if not path.resolve().is_relative_to(folder.resolve()):
                 outside = f"a file outside the specimen's folder ({quoted(name)})"
                 raise fault(source, keys, outside, "one inside it")

@@ -39,7 +39,7 @@ def page(result: Reproduction, bands: dict[str, MuscleBands] | None = None) -> P
             *_tables(result.ledger),
             _unprinted(result.ledger),
             _figures(result.chapter3, bands),
-            _comparison(bands),
+            compared(bands),
         ],
         footer="S. Zabihollah, Modelling, Design Optimization, and Experimental Characterization of "
         "Miniaturized "
@@ -213,7 +213,7 @@ def _figures(chapter: Chapter3, bands: dict[str, MuscleBands]) -> Section:
     )
 
 
-def _comparison(bands: dict[str, MuscleBands]) -> Section:
+def compared(bands: dict[str, MuscleBands]) -> Section:
     """What posteriors say beside the print, and which of them were not given."""
     blocks: list[Block] = []
     if bands:
@@ -226,6 +226,7 @@ def _comparison(bands: dict[str, MuscleBands]) -> Section:
             Notice(
                 "The runs are calibrations to reconstructed loops: they return what the loops were made from."
             ),
+            *_unconverged(bands),
             DataTable(table_4_12(bands), f"Table 4.12. {words}"),
             DataTable(parameters(bands), constants),
         ]
@@ -236,6 +237,13 @@ def _comparison(bands: dict[str, MuscleBands]) -> Section:
         told = "Parts that need a posterior and were given none, and the commands that add them."
         blocks.append(DataTable(absent, told))
     return Section("With a posterior" if bands else "Posteriors: none given", blocks)
+
+
+def _unconverged(bands: dict[str, MuscleBands]) -> list[Block]:
+    """Which bands may be wrong."""
+    names = [name for name, own in bands.items() if not own.converged]
+    words = f"The sampling did not converge for {' and '.join(names)}: these bands may be wrong until it has."
+    return [Notice(words)] if names else []
 
 
 def _strands(bands: dict[str, MuscleBands]) -> list[Block]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.arviz_import import import_arviz
 from mpam_calib.errors import InputError
-from mpam_calib.posterior.stored import RUN_FILE
+from mpam_calib.posterior.stored import RUN_FILE, unconverged
 from mpam_calib.thesis import decoded, friction
 from mpam_calib.thesis.tables import table
 from mpam_calib.units import DEG, MM
@@ -50,13 +50,15 @@ NEAR_KPA = 2.0
 class MuscleBands:
     """A calibrated muscle: the frames of its ``predictions.csv`` or ``bands.csv``, and ``summary.csv``.
 
-    ``f_s`` holds the draws (draws,) of the strands' friction, None where the run has none.
+    ``f_s`` holds the draws (draws,) of the strands' friction, None where the run has none; ``converged`` is
+    false where the run says so of itself.
     """
 
     muscle: str
     bands: pd.DataFrame
     summary: pd.DataFrame
     f_s: Array | None = None
+    converged: bool = True
 
     @classmethod
     def read(cls, muscle: str, run: Path) -> MuscleBands:
@@ -78,9 +80,8 @@ class MuscleBands:
         names = set(summary["parameter"])
         if muscle == MPAM1_STRAND and "f_s" not in names:
             raise InputError(run / "summary.csv", "no f_s", 'a run with friction = "strand"')
-        return cls(
-            muscle, bands.reset_index(drop=True), summary, _strand_draws(run) if "f_s" in names else None
-        )
+        f_s = _strand_draws(run) if "f_s" in names else None
+        return cls(muscle, bands.reset_index(drop=True), summary, f_s, not unconverged(run))
 
     @property
     def coulomb(self) -> bool:

@@ -63,6 +63,21 @@ def test_what_others_left_is_not_written_over(
     assert contents(others) == {"report.html": b"mine"}
 
 
+@pytest.mark.parametrize("command", ["calibrate", "select", "diagnose"])
+def test_nothing_goes_into_the_folder_of_a_reproduction(
+    own_material: Path, tmp_path: Path, here: Here, command: str
+) -> None:
+    repro = tmp_path / "repro"
+    repro.mkdir()
+    (repro / "reproduction.csv").write_text("source\n")
+    (repro / "report.html").write_text("its page")
+    before = contents(repro)
+    result = here(command, own_material, "-o", repro)
+    assert result.code == 2
+    assert "found a reproduction's folder" in result.err
+    assert contents(repro) == before
+
+
 def test_a_run_without_its_mark_is_still_a_run(own_material: Path, own_run: Path, here: Here) -> None:
     (own_run / "run.json").unlink()
     assert here("calibrate", own_material, "-o", own_run, *FAST).code in (0, 3)

@@ -218,6 +218,14 @@ CASES: dict[str, tuple[Spoil, list[str]]] = {
     ),
     "file outside": (outside, ["specimen.toml:11:files.loops: ", "outside the specimen's folder"]),
     "absolute file outside": (toml('"loops.csv"', '"/etc/hostname"'), ["outside the specimen's folder"]),
+    "absolute file inside": (
+        lambda f: toml('"loops.csv"', f'"{(f / "loops.csv").as_posix()}"')(f),
+        ["specimen.toml:11:files.loops: ", "a path from outside the specimen's folder"],
+    ),
+    "file inside by way of outside": (
+        lambda f: toml('"loops.csv"', f'"../{f.name}/loops.csv"')(f),
+        ["specimen.toml:11:files.loops: ", "a path from outside the specimen's folder"],
+    ),
     "file twice": (toml('"loops.csv"', '["loops.csv", "loops.csv"]'), ["twice"]),
     "fewer rows than parameters": (
         rows(lambda lines: lines[:1] + lines[1 :: len(lines) // 4][:4]),

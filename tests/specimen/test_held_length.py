@@ -78,6 +78,22 @@ def test_words_that_are_given_do(tmp_path: Path) -> None:
     assert found.branch.tolist() == np.where(words == "pressurising", 2, -2).tolist()
 
 
+def test_filling_before_the_strokes_is_no_excuse_for_metres(tmp_path: Path) -> None:
+    """Rows at held length need not move; those of strokes must, and in millimetres."""
+    made = loops((50.0, 100.0, 150.0))
+    words = np.where(made.branch > 0, "loading", "unloading").astype("<U14")
+    words[:20] = "pressurising"
+
+    def text(scale: float) -> str:
+        cells = zip(made.time, made.pressure, scale * made.displacement, made.force, words, strict=True)
+        return "\n".join([f"{HEADER},branch", *(",".join(map(str, row)) for row in cells)]) + "\n"
+
+    assert read(make(tmp_path / "mm", loops=text(1.0))).loops is not None
+    for scale, said in ((1e-3, "metres"), (0.0, "never moves")):
+        with pytest.raises(InputError, match=said):
+            read(make(tmp_path / said, loops=text(scale)))
+
+
 def filled(start: float, end: float, rows: int, wait: int) -> Array:
     return np.concatenate([np.linspace(start, end, rows), np.full(wait, end)])
 

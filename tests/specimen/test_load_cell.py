@@ -107,6 +107,15 @@ def test_a_zero_that_is_off(by: dict[float, float], said: str, tmp_path: Path) -
     assert said in found
 
 
+@pytest.mark.parametrize(("by", "told"), [(0.0, False), (-30.0, True)])
+def test_a_cell_that_was_zeroed_while_the_muscle_pulled(by: float, told: bool, tmp_path: Path) -> None:
+    """Most of its forces are below 0, but not where the muscle is long: no sign is flipped."""
+    made = to_free_contraction()
+    force = noisy(made.force) + by
+    assert (np.median(force) < 0.0) == told
+    assert ("the median force is -" in remarks(tmp_path, made, force)) == told
+
+
 @pytest.mark.parametrize("early", [{}, {100.0: 0.7}, {150.0: 0.8}, {50.0: 0.7, 200.0: 0.6}])
 @pytest.mark.parametrize("share", [0.6, 0.9, 1.0])
 def test_strokes_that_end_early_have_zeroed_cells(

@@ -21,6 +21,7 @@ from mpam_calib.thesis.errata import errata
 from mpam_calib.thesis.figures import muscles
 from mpam_calib.thesis.friction import best_strand_factor
 from mpam_calib.thesis.ledger import COLUMNS, MISPRINT, NOT_REPRODUCIBLE, REPRODUCED, Ledger
+from mpam_calib.thesis.page import compared
 from mpam_calib.thesis.posterior import (
     MPAM1,
     MPAM1_STRAND,
@@ -218,6 +219,16 @@ def test_bands_join_tables(tmp_path: Path) -> None:
     assert frame["q50"].iloc[2] == pytest.approx(33.0)
     assert list(frame["extrapolated"]) == [True, False, False]
     assert list(parameters(bands)["printed"]) == ["0.0702", "8.521e5"]
+
+
+@pytest.mark.parametrize("converged", [True, False])
+def test_bands_of_a_run_that_did_not_converge_are_marked(converged: bool, tmp_path: Path) -> None:
+    record = run_folder(tmp_path) / "run.json"
+    record.write_text(json.dumps(json.loads(record.read_text()) | {"converged": converged}))
+    own = MuscleBands.read(MPAM1, tmp_path)
+    assert own.converged == converged
+    told = [block for block in compared({MPAM1: own}).blocks if "did not converge" in str(block)]
+    assert bool(told) != converged
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
