@@ -37,8 +37,8 @@ class MuscleDraws:
     """A model with N draws of its posterior and of the tolerances to which a new muscle is built.
 
     ``tolerance``: SI deviations (N, 1) from the drawing, by the names of the geometry's values. What
-    the run found of its own specimen's geometry, or of its rig, is not carried over. ``beyond``: what is
-    not known outside the recorded pressures.
+    the run found of its own specimen's geometry, or of its rig, is not carried over; a gauge's offset is,
+    as pressures are those that the gauge reads. ``beyond``: what is not known outside the recorded pressures.
     """
 
     model: Model
