@@ -17,6 +17,10 @@ from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.sizes import EXCLUDED, Sizes, Told, sizes_of
 from mpam_calib.criticism.tasks.spread import Alone
 from mpam_calib.model.effect import effect
+from mpam_calib.model.model import build_model
+from mpam_calib.model.priors import Prior
+from mpam_calib.model.state import Setting
+from mpam_calib.specimen.declaration import GeometrySd
 
 CAUSE, SIZE_NAME = "creep", "creep_per_decade"
 TESTS = 120
@@ -119,3 +123,36 @@ def test_a_size_is_held_against_its_declared_sd(problem: Problem, sds: float, wi
     told = {"P_DB_kPa": Told(sds * sd, 0.1 * sd, 0.0, 0.0)}
     assert within_declared("dead_band", told, setting) is within
     assert not within_declared("tip_shape", told, setting)
+
+
+@pytest.mark.parametrize(
+    ("cause", "name", "size"), [("braid_angle", "delta_alpha_deg", -0.4), ("dead_band", "P_DB_kPa", 0.3)]
+)
+def test_a_cause_may_be_far_larger_than_its_declared_sd(
+    problem: Problem, cause: str, name: str, size: float
+) -> None:
+    """Who declares an angle or a gauge to be known well may be wrong: ``size`` in sds without that."""
+    hidden = force_with(problem, fit(problem, frozenset(), 0), cause, {name: size})
+    blueprint = problem.blueprint
+    assert blueprint.geometry is not None
+    sure = blueprint.model_copy(
+        update={
+            "geometry": blueprint.geometry.model_copy(update={"sd": GeometrySd(alpha0_deg=0.01)}),
+            "sensors": blueprint.sensors.model_copy(update={"pressure_bias_sd_kPa": 0.01}),
+        }
+    )
+    measured = problem.with_force(hidden + problem.force - fit(problem, frozenset(), 0).force)
+    assert problem.model.setting is not None
+    true = prior_of(cause, problem.model.setting).from_normal(np.array([size]))[0]
+    for declared in (blueprint, sure):
+        found = fit(measured, frozenset([cause]), 0, blueprint=declared)
+        setting = build_model(declared).setting
+        assert setting is not None
+        value = prior_of(cause, setting).from_normal(found.u[[found.names.index(name)]])[0]
+        assert value == pytest.approx(true, rel=0.05)
+
+
+def prior_of(cause: str, setting: Setting) -> Prior:
+    """Of a cause with one parameter."""
+    (parameter,) = effect(cause).parameters(setting)
+    return parameter.prior

@@ -11,10 +11,12 @@ from mpam_calib.model.state import Setting, State
 from mpam_calib.units import DEG
 
 LIMITS = (5.0 * DEG, 89.0 * DEG)
+OWN_SD = 2.0
+"""Prior sd of an angle that is wrong, deg: also of one that was declared to be known far better."""
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
-    sd = setting.geometry.sd.alpha0_deg or 2.0
+    sd = float(np.hypot(setting.geometry.sd.alpha0_deg, OWN_SD))
     return (Parameter("delta_alpha_deg", Normal(0.0, sd * DEG), "true braid angle minus the declared one"),)
 
 

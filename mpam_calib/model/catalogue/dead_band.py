@@ -20,10 +20,8 @@ OWN_SD = 0.1
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
     # Both signs: a gauge that reads low looks like a negative dead-band. A level at which the muscle
     # was seen to pull lies above it.
-    sd = setting.pressure_bias_sd or OWN_SD * setting.top_pressure
-    if setting.pressure_bias_sd and setting.nuisances:
-        # One parameter for both: a dead-band and a gauge's offset are the same in every recording.
-        sd = float(np.hypot(setting.pressure_bias_sd, OWN_SD * setting.top_pressure))
+    # One parameter for both: a dead-band and a gauge's offset are the same in every recording.
+    sd = float(np.hypot(setting.pressure_bias_sd, OWN_SD * setting.top_pressure))
     prior = NormalWithin(0.0, sd, -np.inf, setting.pulls_at)
     return (Parameter("P_DB_kPa", prior, "pressure that does no work yet", "thesis Eq. 2.45"),)
 
