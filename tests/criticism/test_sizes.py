@@ -137,8 +137,8 @@ def test_a_cause_may_be_far_larger_than_its_declared_sd(
     assert blueprint.geometry is not None
     sure = blueprint.model_copy(
         update={
-            "geometry": blueprint.geometry.model_copy(update={"sd": GeometrySd(alpha0_deg=0.01)}),
-            "sensors": blueprint.sensors.model_copy(update={"pressure_bias_sd_kPa": 0.01}),
+            "geometry": blueprint.geometry.model_copy(update={"sd": GeometrySd(alpha0_deg=0.1)}),
+            "sensors": blueprint.sensors.model_copy(update={"pressure_bias_sd_kPa": 0.1}),
         }
     )
     measured = problem.with_force(hidden + problem.force - fit(problem, frozenset(), 0).force)

@@ -96,3 +96,12 @@ def test_what_an_effect_holds_is_sampled_once() -> None:
     names = made_with(*told, effects=("dead_band", "braid_angle")).names
     assert not {BIAS, "alpha0_deg"} & set(names)
     assert {"P_DB_kPa", "delta_alpha_deg"} <= set(names)
+
+
+@pytest.mark.parametrize("declared", [0.1, 1.0])
+def test_an_angle_that_is_wrong_has_the_declared_sd_as_its_prior(declared: float) -> None:
+    """With tails: eight of its sds are not out of reach (of a normal one 32 nats, here 14)."""
+    made = made_with(Sensors(), GeometrySd(alpha0_deg=declared), effects=("braid_angle",))
+    (prior,) = (p.prior for p in made.parameters if p.name == "delta_alpha_deg")
+    assert prior.sd == pytest.approx(np.radians(declared), rel=1e-6)
+    assert 0.5 * prior.to_normal(8.0 * np.radians(np.array([declared])))[0] ** 2 < 16.0

@@ -6,18 +6,20 @@ import numpy as np
 
 from mpam_calib.model.curves import middle_pressure, power
 from mpam_calib.model.effect import Effect, Stage, Values, register
-from mpam_calib.model.priors import Normal, Parameter
+from mpam_calib.model.priors import LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
 from mpam_calib.units import DEG
 
 LIMITS = (5.0 * DEG, 89.0 * DEG)
-OWN_SD = 2.0
-"""Prior sd of an angle that is wrong, deg: also of one that was declared to be known far better."""
+OWN_SD = 2.0 * DEG
+"""Prior sd of an angle of which none is declared."""
 
 
 def _parameters(setting: Setting) -> tuple[Parameter, ...]:
-    sd = float(np.hypot(setting.geometry.sd.alpha0_deg, OWN_SD))
-    return (Parameter("delta_alpha_deg", Normal(0.0, sd * DEG), "true braid angle minus the declared one"),)
+    declared = setting.geometry.sd.alpha0_deg * DEG
+    # The declared sd, but with long tails: an angle that is said to be known well may be wrong all the same.
+    prior = LongTailed(declared / LongTailed(1.0).sd) if declared > 0.0 else Normal(0.0, OWN_SD)
+    return (Parameter("delta_alpha_deg", prior, "true braid angle minus the declared one"),)
 
 
 def _apply(state: State, values: Values, setting: Setting) -> State:
