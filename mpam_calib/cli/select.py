@@ -24,13 +24,15 @@ def select(
     import pandas as pd
 
     from mpam_calib.cli.progress import stage_progress
-    from mpam_calib.report.selection import selection_sentence, short_name
+    from mpam_calib.report.numbers import probability
+    from mpam_calib.report.selection import compared, selection_sentence, short_name
     from mpam_calib.run.select import select_to_folder
 
     with stage_progress() as tell:
         found = select_to_folder(specimen, output, seed=seed, replicates=replicates, tell=tell)
     models = pd.read_csv(output / "models.csv", keep_default_na=False)
-    best = models.iloc[0]
+    best = short_name(models.iloc[0], compared(models))
+    likely = probability(float(models["probability"].iloc[0]))
     print(selection_sentence(models))
-    print(f"first of {len(models)}: {short_name(best)} (probability {best['probability']:.3g})")
+    print(f"first of {len(models)}: {best} (probability {likely})")
     print(f"{output / 'report.html'} {'written' if found else 'kept (same data, model and options)'}")

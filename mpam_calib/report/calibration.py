@@ -106,7 +106,8 @@ def _sections(view: CalibrationView) -> list[Section]:
     found: list[Section] = []
     if not view.quantity("force_N").empty:
         caption = (
-            "Dots: readings. Line: median of the calibrated simulation; dark and light bands hold the true "
+            "Dots: readings, or means of neighbours in one stroke. Line: median of the calibrated "
+            "simulation; dark and light bands hold the true "
             f"force with 50 % and 90 % probability.{_noisy_words(view)}{omitted}"
         )
         colours = " Blue: loading (pulled back to length). Orange: unloading (contracting)." if moving else ""
@@ -136,8 +137,8 @@ def _noisy_words(view: CalibrationView) -> str:
 
 def _residual_section(view: CalibrationView) -> Section:
     caption = (
-        "Readings minus simulation. Dots: single readings. Lines: their means over short stretches of the "
-        "stroke, one colour for each level. Grey: one sigma of a reading's noise."
+        "Readings minus simulation. Dots: readings, or means of neighbours in one stroke. Lines: their means "
+        "over short stretches of the stroke, one colour for each level. Grey: one sigma of a reading's noise."
     )
     return Section(
         "What the simulation misses",

@@ -9,7 +9,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from mpam_calib.criticism.selection.select import Selection
-from mpam_calib.model.blueprint import draw_blueprint
+from mpam_calib.model.blueprint import MaterialPosterior, draw_blueprint
 from mpam_calib.model.nuisance import nuisance_parameters
 from mpam_calib.posterior.likelihood.floor import pulling
 from mpam_calib.posterior.likelihood.points import KINDS, gather_points
@@ -134,16 +134,16 @@ def _with_errors(models: pd.DataFrame, column: str, digits: int, least: float = 
     return found
 
 
-def declared_sds(specimen: Specimen) -> list[str]:
+def declared_sds(specimen: Specimen, material: MaterialPosterior | None) -> list[str]:
     """Declared uncertainties of geometry and gauge, of which no effect takes care."""
-    setting = draw_blueprint(specimen).setting()
+    setting = draw_blueprint(specimen, material=material).setting()
     return [] if setting is None else [parameter.name for parameter in nuisance_parameters(setting)]
 
 
-def not_in_evidence(specimen: Specimen) -> list[str]:
+def not_in_evidence(specimen: Specimen, material: MaterialPosterior | None) -> list[str]:
     """What is declared or recorded, calibration uses, and no model of the ranking does."""
     found, slack = [], 0
-    if uncertain := declared_sds(specimen):
+    if uncertain := declared_sds(specimen, material):
         found.append(
             f"Declared uncertainties ({', '.join(uncertain)}) are not part of this ranking: every model has "
             "the declared values, as if they were exact. If one is off, that shows up here as another "
@@ -164,8 +164,8 @@ def not_in_evidence(specimen: Specimen) -> list[str]:
     return found
 
 
-def selection_page(found: Selection, specimen: Specimen) -> Page:
-    """The page for one selection."""
+def selection_page(found: Selection, specimen: Specimen, material: MaterialPosterior | None = None) -> Page:
+    """The page for one selection; ``material`` is what ``moduli = "run:..."`` names."""
     models = found.models
     sure = float(models["probability"].iloc[0]) >= SURE and len(models) > 1
     agrees, said = held_out_sentence(models)
@@ -177,7 +177,7 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
         reasons.append(f"not compared, as all models have the same: {alike}")
     if found.noise_guess is not None:
         reasons.append("the noise of a reading is only assumed, and all probabilities with it")
-    if uncertain := declared_sds(specimen):
+    if uncertain := declared_sds(specimen, material):
         reasons.append(f"declared uncertainties ({', '.join(uncertain)}) are not in the evidence")
     mistaken = " or ".join([c for c in ("order", "strain") if c in compared(models)] or compared(models))
     good = sure and agrees and not uncertain and found.noise_guess is None
@@ -186,7 +186,9 @@ def selection_page(found: Selection, specimen: Specimen) -> Page:
         Verdict("Model selection", "good" if good else "caution", reasons),
         Notice(AS_DECLARED.format(", ".join(specimen.simulation.effects) or "none", mistaken)),
     ]
-    lead += [Notice(text) for text in [*left_aside(specimen, "ranking"), *not_in_evidence(specimen)]]
+    lead += [
+        Notice(text) for text in [*left_aside(specimen, "ranking"), *not_in_evidence(specimen, material)]
+    ]
     if found.noise_guess is not None:
         lead.append(Notice(ASSUMED_NOISE.format(significant(found.noise_guess))))
     choices = compared(models)

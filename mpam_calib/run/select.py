@@ -52,6 +52,6 @@ def select_to_folder(
     kept.begin()
     write_csv(found.models, run / "models.csv")
     write_csv(found.sensitivity, run / "prior_sensitivity.csv")
-    selection_page(found, specimen).write(run / "report.html")
+    selection_page(found, specimen, material).write(run / "report.html")
     kept.finish()
     return found

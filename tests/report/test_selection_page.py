@@ -13,6 +13,7 @@ from criticism.test_hypotheses import specimen_of
 from mpam_calib.criticism.selection.held_out import LEVEL_COLUMNS
 from mpam_calib.criticism.selection.odds import odds
 from mpam_calib.criticism.selection.select import COLUMNS, Selection
+from mpam_calib.model.blueprint import MaterialPosterior
 from mpam_calib.report.choices import choice_sentences
 from mpam_calib.report.page import DataTable, Headline, Notice, Page, Text, Verdict
 from mpam_calib.report.selection import evidence_text, ranking_table, selection_page, selection_sentence
@@ -22,7 +23,17 @@ from mpam_calib.specimen.recording import ForceMap, FreeContraction, Specimen
 SPECIMEN = specimen_of("develop-null-006")
 
 
+MATERIAL = MaterialPosterior(mean=(4e4,), covariance=((1e6,),), strain_range=None, convention="stretch")
+
 UNKNOWN = (float("nan"), float("nan"))
+
+
+def test_moduli_of_another_run_have_their_page() -> None:
+    simulation = SPECIMEN.simulation.model_copy(update={"moduli": "run:../material"})
+    told = page(
+        models(UNKNOWN, UNKNOWN), specimen=replace(SPECIMEN, simulation=simulation), material=MATERIAL
+    )
+    assert any(isinstance(block, Headline) for block in told.lead)
 
 
 def models(*held: tuple[float, float]) -> pd.DataFrame:
@@ -40,6 +51,7 @@ def page(
     specimen: Specimen = SPECIMEN,
     noise: float | None = None,
     replicates: int = 0,
+    material: MaterialPosterior | None = None,
 ) -> Page:
     if sensitivity is None:
         widths = [(i + 1, "as declared", 0.0, 1.0) for i in range(len(table))]
@@ -47,7 +59,7 @@ def page(
     levels = pd.DataFrame(columns=["model", *LEVEL_COLUMNS])
     chances = odds(table, SPECIMEN.simulation)
     found = Selection(table, chances, levels, np.eye(len(table)), replicates, sensitivity, 0.01, noise)
-    return selection_page(found, specimen)
+    return selection_page(found, specimen, material)
 
 
 @pytest.mark.parametrize(
