@@ -72,7 +72,7 @@ def _noise(problem: Problem, fitted: Fit) -> float:
     level = problem.noise_level
     if problem.rows is None or level.growth > 0.0:
         return level.total
-    residual = raw_residual(problem.rows, problem.blueprint.model_dump_json(), fitted)
+    residual = raw_residual(problem.rows, problem.declared, fitted)
     return min(level.total, float(np.sqrt(np.mean(residual**2))))
 
 

@@ -53,7 +53,7 @@ def hidden_sizes(
         for kind in (e, *(f"{e}:{name}" for name in effect(e).kinds))
         if len(effect(kind).parameters(setting)) == 1
     ]
-    doubt = doubt_about(problem, problem.blueprint.model_dump_json(), named)
+    doubt = doubt_about(problem, problem.declared, named)
     tasks = [(named, doubt, kind) for kind in kinds]
     found: dict[str, list[tuple[float, Band]]] = {}
     for kind, band in zip(kinds, (spread or Alone(problem))(_band, tasks), strict=True):
@@ -69,7 +69,7 @@ def hidden_sizes(
 
 def _beside(problem: Problem, named: Fit, doubt: Array, further: frozenset[str] = NOTHING) -> Climb:
     """A climb of the causes named and further ones, beside a doubt about the former (n, r), N."""
-    chain = chain_for(problem.blueprint.model_dump_json(), named.effects | further)
+    chain = chain_for(problem.declared, named.effects | further)
     return Climb(problem, chain, 0, doubt)
 
 

@@ -129,12 +129,12 @@ class Chain:
         """Number of the moduli's coordinates."""
         return 0 if self.moduli is None else self.moduli.size
 
-    @property
+    @cached_property
     def uses_force(self) -> bool:
         """Whether an effect needs the muscle's own force."""
         return any(item.uses_force for item in self.effects)
 
-    @property
+    @cached_property
     def memory(self) -> bool:
         """Whether an effect looks at what was before."""
         return any(item.memory for item in self.effects)

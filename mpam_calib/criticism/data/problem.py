@@ -95,6 +95,11 @@ class Problem:
         return build_model(self.blueprint)
 
     @cached_property
+    def declared(self) -> str:
+        """The blueprint as JSON: what a chain of the declared simulation is kept by."""
+        return self.blueprint.model_dump_json()
+
+    @cached_property
     def force_scale(self) -> float:
         """The specimen's size of a force, N."""
         assert self.model.setting is not None

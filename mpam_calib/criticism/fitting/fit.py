@@ -129,7 +129,7 @@ def by_equations(problem: Problem, found: Fit) -> Array:
     """
     if found.doubt_sd == 0.0:
         return found.force
-    chain = chain_for(problem.blueprint.model_dump_json(), found.effects)
+    chain = chain_for(problem.declared, found.effects)
     climb = Climb(problem, chain, found.size, np.empty((len(problem), 0)))
     p = chain.linear_size
     place = climb.look_with_its_signs(found.u, climb.guide(), np.zeros(p))
@@ -154,7 +154,7 @@ def fit(
     ends early, and each where a round promises fewer nats than ``converged``. Raises ``LinAlgError`` where no
     climb from there ends.
     """
-    key = (blueprint or problem.blueprint).model_dump_json()
+    key = problem.declared if blueprint is None else blueprint.model_dump_json()
     chain, n = chain_for(key, effects), len(problem)
     climb = Climb(problem, chain, size, np.empty((n, 0)), rival, converged)
     u = np.array([(start or {}).get(name, 0.0) for name in climb.names], dtype=np.float64)

@@ -69,7 +69,7 @@ def _columns(chain: Chain, values: Values, problem: Problem, force: Array, eta: 
 
 def linearise(problem: Problem, fitted: Fit, blueprint: Blueprint | None = None) -> tuple[Array, Array]:
     """Force (n,), the doubt's part in it, and Jacobian (n, d + p + r) at a fit, on all rows of a problem."""
-    key = (blueprint or problem.blueprint).model_dump_json()
+    key = problem.declared if blueprint is None else blueprint.model_dump_json()
     chain = chain_for(key, fitted.effects)
     n, d = len(problem), len(fitted.u)
     points = fitted.u + np.concatenate([np.zeros((1, d)), STEP * np.eye(d)])

@@ -169,6 +169,7 @@ class Search:
     def polish_all(self, keys: Iterable[tuple[Set, int]]) -> None:
         """Change one form of a set at a time, as long as that helps."""
         todo = [k for k in dict.fromkeys(keys) if k in self.fits and k not in self.polished]
+        todo.sort(key=lambda k: -len(k[0]))  # the longest first: nobody waits for one that began last
         better = dict(zip(todo, self.spread(with_better_forms, [self.fits[k] for k in todo]), strict=True))
         self.polished |= {k: f.effects == self.fits[k].effects for k, f in better.items()}
         self.fits.update(better)

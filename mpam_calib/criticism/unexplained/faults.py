@@ -53,7 +53,7 @@ def faults_of(problem: Problem, fitted: Fit) -> Faults:
     if problem.rows is None:
         return Faults(problem.saturated)
     rows, noise = problem.rows, problem.noise_level
-    residual = raw_residual(rows, problem.blueprint.model_dump_json(), fitted)
+    residual = raw_residual(rows, problem.declared, fitted)
     grows = grown(np.array(noise.growth), rows.force, problem.force_scale)
     repeating = repeating_rms(rows, residual)
     # Tails that were declared are no bursts.
