@@ -26,6 +26,8 @@ SCREENED, BENT = 80, 20
 """Further sets of three that straight lines along the pairs promise most of; so many of them are bent."""
 MUCH_LESS = 0.8
 """Scale of the noise down to which forms that were tried before, and stayed, need not be tried again."""
+FEW_CARRIED = 2
+"""Kept sets of each size whose forms a fold chooses before it extends them."""
 DOUBTED = 4
 """Leading sets for each that is extended, doubted in the end."""
 
@@ -75,7 +77,9 @@ def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
         found.refit_all((s, size) for s in [frozenset(), *singles])
         tell(0.05 * (size + 1))
     kept = found.kept(1, width)
-    found.polish(kept)
+    # What larger sets take over; folds carry on what leads.
+    carried = None if width >= WIDTH else FEW_CARRIED
+    found.polish(kept[:carried])
     best = [next(iter(s)) for s in found.kept(1, PARTNERS)][:PARTNERS]
     for k in range(2, LARGEST + 1):
         if k == 2 and width >= WIDTH:
@@ -99,7 +103,7 @@ def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:
         for size in every:
             found.refit_all((effects, size) for effects in kept)
         if k < LARGEST:
-            found.polish(kept)
+            found.polish(kept[:carried])
     found.polish_near()
 
 
