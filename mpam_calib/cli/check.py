@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 @app.command()
 def check(
-    specimen: Annotated[Path, typer.Argument(help="Specimen folder, or its specimen.toml.")],
+    specimen: Annotated[
+        Path, typer.Argument(metavar="SPECIMEN", help="Specimen folder, or its specimen.toml.")
+    ],
 ) -> None:
     """Print what was read: rows, levels, cycles, branches, speeds, what is missing, what looks odd."""
     from rich.console import Console

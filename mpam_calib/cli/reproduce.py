@@ -12,7 +12,10 @@ from mpam_calib.cli.app import app
 
 @app.command()
 def reproduce(
-    out: Annotated[Path, typer.Option("-o", "--output", help="folder for reproduction.csv and report.html")],
+    out: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="DIR", help="folder for reproduction.csv and report.html"),
+    ],
     seed: Annotated[int, typer.Option(help="seed of the stochastic searches", min=0)] = 0,
     mpam1: Annotated[Path | None, typer.Option(help="RUN folder whose bands are shown for MPAM1")] = None,
     mpam2: Annotated[Path | None, typer.Option(help="RUN folder whose bands are shown for MPAM2")] = None,

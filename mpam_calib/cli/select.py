@@ -12,8 +12,10 @@ from mpam_calib.cli.app import app
 
 @app.command()
 def select(
-    specimen: Annotated[Path, typer.Argument(help="specimen folder or its specimen.toml")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="the RUN folder to write")],
+    specimen: Annotated[
+        Path, typer.Argument(metavar="SPECIMEN", help="specimen folder or its specimen.toml")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="RUN", help="the RUN folder to write")],
     seed: Annotated[int, typer.Option(help="seed of every random choice", min=0)] = 0,
     replicates: Annotated[int, typer.Option(help="replicates of the confusion matrix (0: none)", min=0)] = 8,
 ) -> None:

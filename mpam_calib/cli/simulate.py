@@ -14,13 +14,20 @@ from mpam_calib.errors import InputError
 
 @app.command()
 def simulate(
-    specimen: Annotated[Path, typer.Argument(help="specimen folder or its specimen.toml")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="the specimen folder to write")],
+    specimen: Annotated[
+        Path, typer.Argument(metavar="SPECIMEN", help="specimen folder or its specimen.toml")
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="the specimen folder to write")
+    ],
     more: Annotated[
         list[str] | None, typer.Argument(metavar="ID", help="further effects, after --hide")
     ] = None,
     hide: Annotated[
-        list[str] | None, typer.Option(help="ID, ID:FORM or ID=VALUE of an effect to hide")
+        list[str] | None,
+        typer.Option(
+            help="ID, ID:FORM, ID=VALUE or ID:FORM=VALUE: an effect to hide, its size in its parameter's unit"
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(help="seed of the noise", min=0)] = 0,
 ) -> None:

@@ -37,12 +37,22 @@ def is_units_row(label: str, row: int, cells: Sequence[str], fields: Sequence[Fi
     """
     read = [field for field in fields if field.name not in TEXT_COLUMNS and field.position < len(cells)]
     written = {field: cells[field.position].strip().strip("[]()") for field in read}
-    known = {field: worth(field.name, unit) for field, unit in written.items()}
-    if not any(written.values()) or None in known.values():
+    if not any(written.values()) or not all(_is_unit(field, unit) for field, unit in written.items()):
         return False
     for field, unit in written.items():
         _check_scale(label, row, field, unit)
     return True
+
+
+def _is_unit(field: Field, unit: str) -> bool:
+    """Whether a word is a unit of the column, or any at all where the map makes another quantity of it.
+
+    Extension becomes strain by a scale that is no unit's, and its unit is a length's.
+    """
+    if worth(field.name, unit) is not None:
+        return True
+    changed = not any(_alike(abs(field.scale), each) for each in _units(field.name).values())
+    return changed and any(unit.lower() in units for units in (_PLAIN, *_IN.values()))
 
 
 def check_header_units(label: str, row: int, header: Sequence[str], fields: Sequence[Field]) -> None:

@@ -81,3 +81,22 @@ def test_a_unit_of_its_own_scale_is_read(
 @pytest.mark.parametrize("name", ["Channel (left)", "Channel/2", "Channel (kN) raw", "kN"])
 def test_what_is_no_unit_is_a_name(name: str, tmp_path: Path) -> None:
     read(folder(tmp_path, 3, "", 1.0, 1.0, in_name=name))
+
+
+@pytest.mark.parametrize(("units", "read_as"), [("mm,N", True), ("furlong,N", False)])
+def test_units_of_what_a_map_makes_another_quantity_of(tmp_path: Path, units: str, read_as: bool) -> None:
+    """Extension and force of a tensile tester, in its units, become strain and stress."""
+    rows = "\n".join(f"{0.5 * i},{0.02 * i}" for i in range(60))
+    mapped = (
+        '[columns.tensile]\nstrain = { name = "Extension", scale = 0.04 }\n'
+        'stress_Pa = { name = "Force", scale = 1e5 }\n[simulation]'
+    )
+    text = DECLARATION.replace("[simulation]", mapped)
+    text = text.replace('loops = "loops.csv"', 'loops = "loops.csv"\ntensile = "tensile.csv"')
+    made = make(tmp_path, text, loops=loops().text(), tensile=f"Extension,Force\n{units}\n{rows}\n")
+    if read_as:
+        found = read(made).tensile
+        assert found is not None and found.strain.max() == pytest.approx(0.04 * 29.5)
+    else:
+        with pytest.raises(InputError, match=r"tensile.csv:2:strain: found \"furlong\", expected a number"):
+            read(made)
