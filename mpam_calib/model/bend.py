@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.curves import over_mean
-from mpam_calib.model.distinct import over_distinct
 from mpam_calib.model.priors import Normal, Parameter
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.state import Setting, State
@@ -120,9 +119,7 @@ def bend_factor(
     constant = values.get(first, np.zeros_like(values[others[0]]))
     coefficients = np.concatenate([constant, *(values[other] for other in others)], axis=1)
     bases = {driver: _basis(driver, degree, state, setting) for driver, degree in bends.items()}
-    if any(basis.shape[1] > 1 for basis in bases.values()):
-        return _factor(coefficients, bases)
-    return over_distinct(coefficients, lambda some: _factor(some, bases))
+    return _factor(coefficients, bases)
 
 
 @lru_cache(maxsize=1024)

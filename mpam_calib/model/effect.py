@@ -195,12 +195,20 @@ def bent(item: Effect) -> Effect:
         name = own[0].name if own else item.id
         return (*own, *bend_parameters(name, item.bends, item.looseness, constant=not own))
 
+    last: list[tuple[Setting, tuple[Parameter, ...]]] = []
+
+    def own_of(setting: Setting) -> tuple[Parameter, ...]:
+        # A climb asks for those of one setting many times.
+        if not last or last[0][0] is not setting:
+            last[:] = [(setting, item.parameters(setting))]
+        return last[0][1]
+
     def apply(state: State, values: Values, setting: Setting) -> State:
-        sizes = {p.name: values[p.name] for p in item.parameters(setting)} or {item.id: np.ones((1, 1))}
+        own = own_of(setting)
+        sizes = {p.name: values[p.name] for p in own} or {item.id: np.ones((1, 1))}
         factor = bend_factor(next(iter(sizes)), item.bends, values, state, setting)
         if item.added:
-            units = {p.name: p.prior.sd for p in item.parameters(setting)}
-            bent_sizes = {name: size + units[name] * (factor - 1.0) for name, size in sizes.items()}
+            bent_sizes = {p.name: sizes[p.name] + p.prior.sd * (factor - 1.0) for p in own}
         else:
             bent_sizes = {name: size * factor for name, size in sizes.items()}
         return item.apply(state, {**values, **bent_sizes}, setting)

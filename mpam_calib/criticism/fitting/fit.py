@@ -88,9 +88,14 @@ def extended(blueprint: Blueprint, effects: frozenset[str]) -> Blueprint:
 @lru_cache(maxsize=4096)
 def chain_for(key: str, effects: frozenset[str]) -> Chain:
     """The chain of a blueprint (as JSON) with more effects."""
-    chain = build_model(extended(Blueprint.model_validate_json(key), effects)).chain
+    chain = build_model(extended(_blueprint_of(key), effects)).chain
     assert chain is not None
     return chain
+
+
+@lru_cache(maxsize=8)
+def _blueprint_of(key: str) -> Blueprint:
+    return Blueprint.model_validate_json(key)
 
 
 def doubt_columns(
