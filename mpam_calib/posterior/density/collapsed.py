@@ -36,10 +36,11 @@ from mpam_calib.posterior.likelihood.covariance import (
     fast_noise_covariance,
     fast_noise_log_likelihood,
 )
-from mpam_calib.posterior.likelihood.points import FREE, Points, TensilePoints
+from mpam_calib.posterior.likelihood.points import FREE, Points
 from mpam_calib.posterior.likelihood.scatter import Scatter
 from mpam_calib.posterior.likelihood.sites import FreeRows, Sites, chunk_log_likelihood, usual_chunks
 from mpam_calib.posterior.likelihood.strokes import Strokes
+from mpam_calib.posterior.likelihood.tensile_points import TensilePoints
 from mpam_calib.posterior.likelihood.white import white_terms
 
 Array = NDArray[np.float64]
@@ -385,4 +386,10 @@ class Collapsed:
         if MISFIT in values:
             design[:, :, sizes[0] + sizes[1] :] = values[MISFIT][:, :, None] * model.remainder(tensile.strain)
         residual = np.broadcast_to(tensile.stress - powers @ mean[0], design.shape[:2])
-        return white_piece(design, residual, values[NOISE] ** 2 / tensile.count)
+        variance = values[NOISE] ** 2
+        piece = white_piece(design, residual, variance / tensile.count)
+        # What scatters about the points knows the noise alone.
+        others = tensile.rows - len(tensile.strain)
+        scatter = tensile.within / variance + others * (np.log(variance) + LOG_2PI)
+        weights = float(np.log(tensile.count).sum())
+        return piece._replace(constant=piece.constant + scatter[:, 0] + weights)

@@ -15,8 +15,9 @@ from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.posterior.density.collapsed import Collapsed, Data, Guide
 from mpam_calib.posterior.density.mode import Mode, climb_modes, find_modes
 from mpam_calib.posterior.likelihood.bins import LoopBins, bin_loops
-from mpam_calib.posterior.likelihood.points import FREE, floor_of, gather_points, gather_tensile
+from mpam_calib.posterior.likelihood.points import FREE, floor_of, gather_points
 from mpam_calib.posterior.likelihood.sites import LEAST_SHARE
+from mpam_calib.posterior.likelihood.tensile_points import gather_tensile
 from mpam_calib.specimen.recording import Loops, Specimen
 
 Array = NDArray[np.float64]

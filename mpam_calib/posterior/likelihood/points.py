@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.likelihood.floor import lifted_by_noise
-from mpam_calib.specimen.recording import FreeContraction, Specimen, Tensile
+from mpam_calib.specimen.recording import FreeContraction, Specimen
 
 Array = NDArray[np.float64]
-
-TENSILE_POINTS = 400
 
 
 @dataclass(frozen=True)
@@ -104,27 +102,3 @@ def floor_of(declared: float | None, points: Points | None) -> float:
     if points is None or slack is None or not slack.any():
         return 0.0
     return max(float(np.median(points.force[slack])), 0.0)
-
-
-@dataclass(frozen=True)
-class TensilePoints:
-    """Stress-strain points (n,) in the declared range: strain, stress (Pa), rows behind each."""
-
-    strain: Array
-    stress: Array
-    count: Array
-
-
-def gather_tensile(tensile: Tensile, low: float, high: float) -> TensilePoints:
-    """The test's points within [low, high], averaged in order of strain where there are many."""
-    order = np.argsort(tensile.strain, kind="stable")
-    strain, stress = tensile.strain[order], tensile.stress_Pa[order]
-    inside = (strain >= low) & (strain <= high)
-    strain, stress = strain[inside], stress[inside]
-    starts = np.unique(
-        np.linspace(0, len(strain), min(len(strain), TENSILE_POINTS) + 1).astype(np.int64)[:-1]
-    )
-    count = np.diff(np.append(starts, len(strain))).astype(np.float64)
-    return TensilePoints(
-        np.add.reduceat(strain, starts) / count, np.add.reduceat(stress, starts) / count, count
-    )

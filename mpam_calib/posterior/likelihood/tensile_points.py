@@ -1,0 +1,102 @@
+"""A tensile test of any length as at most some hundred points, and what its rows scatter about them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from mpam_calib.specimen.recording import Tensile
+
+Array = NDArray[np.float64]
+
+TENSILE_POINTS = 400
+"""Rows that are taken as they are; more are grouped, two points a group."""
+DEGREE = 12
+"""Of the polynomial whose residuals show how alike neighbouring rows are: as high as a remainder goes."""
+
+
+@dataclass(frozen=True)
+class TensilePoints:
+    """Stress-strain points (n,) in the declared range: strain, stress (Pa), readings behind each.
+
+    ``within`` (Pa²) is the sum of squares of the rows about the lines of their groups, ``rows`` how many
+    independent readings all of them are worth.
+    """
+
+    strain: Array
+    stress: Array
+    count: Array
+    within: float
+    rows: float
+
+
+def gather_tensile(tensile: Tensile, low: float, high: float) -> TensilePoints:
+    """The test's points within [low, high] in order of strain, groups of neighbours where there are many.
+
+    A group keeps its line, as two points at the mean strain ± its spread that weigh half of its rows each,
+    and the sum of squares about that line. Together they are the sum of squares of all rows about any law
+    that is straight across the group: what differs at one strain (noise, another piece, the way back) is not
+    averaged away.
+    """
+    inside = (tensile.strain >= low) & (tensile.strain <= high)
+    strain, stress = tensile.strain[inside], tensile.stress_Pa[inside]
+    order = np.argsort(strain, kind="stable")
+    n = len(order)
+    if n <= TENSILE_POINTS:
+        return TensilePoints(strain[order], stress[order], np.ones(n), 0.0, float(n))
+    e, s = strain[order], stress[order]
+    starts = np.linspace(0, n, TENSILE_POINTS // 2 + 1).astype(np.int64)[:-1]
+    size = np.diff(np.append(starts, n))
+    own = np.repeat(np.arange(len(starts)), size)
+
+    def mean(z: Array) -> Array:
+        return np.asarray(np.add.reduceat(z, starts) / size)
+
+    middle, level = mean(e), mean(s)
+    e, s = e - middle[own], s - level[own]
+    spread = np.sqrt(mean(e**2))
+    e = e / np.where(spread > 0.0, spread, 1.0)[own]
+    rise = mean(e * s)
+    ends = np.array([-1.0, 1.0])
+    points = TensilePoints(
+        (middle[:, None] + ends * spread[:, None]).ravel(),
+        (level[:, None] + ends * rise[:, None]).ravel(),
+        np.repeat(0.5 * size, 2),
+        float(np.sum((s - rise[own] * e) ** 2)),
+        float(n),
+    )
+    return _counted(points, _alike(points, strain, stress))
+
+
+def _counted(points: TensilePoints, alike: float) -> TensilePoints:
+    """The points where each row says as much as one in ``alike``, all of them at least what a few would.
+
+    Pieces that differ, and a way back, leave residuals that go on from row to row: more rows of the same
+    pieces then tell no more of the law, though each scatters as before.
+    """
+    rows = max(points.rows / alike, float(TENSILE_POINTS))
+    share = rows / points.rows
+    return TensilePoints(points.strain, points.stress, share * points.count, share * points.within, rows)
+
+
+def _alike(points: TensilePoints, strain: Array, stress: Array) -> float:
+    """Integrated autocorrelation time, at least 1, of the rows (N,) in their order, about a smooth curve.
+
+    Geyer's initial positive sequence (1992, doi:10.1214/ss/1177011137).
+    """
+    centre, half = 0.5 * float(strain.max() + strain.min()), 0.5 * float(np.ptp(strain)) or 1.0
+    weight = np.sqrt(points.count)
+    waves = np.polynomial.chebyshev.chebvander((points.strain - centre) / half, DEGREE)
+    curve = np.linalg.lstsq(weight[:, None] * waves, weight * points.stress, rcond=None)[0]
+    left = stress - np.polynomial.chebyshev.chebval((strain - centre) / half, curve)
+    n = len(left)
+    padded = fft.next_fast_len(2 * n, real=True)
+    covariance = fft.irfft(np.abs(fft.rfft(left, n=padded)) ** 2, n=padded)[:n]
+    if covariance[0] <= 0.0:
+        return 1.0
+    pairs = (covariance[: n - n % 2].reshape(-1, 2) / covariance[0]).sum(axis=1)
+    kept = int(np.argmax(pairs <= 0.0)) if (pairs <= 0.0).any() else len(pairs)
+    return max(2.0 * float(pairs[:kept].sum()) - 1.0, 1.0)

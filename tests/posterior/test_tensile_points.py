@@ -1,0 +1,88 @@
+"""A tensile test of many rows: grouped, it says of noise and moduli what its rows do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from model import build
+from numpy.typing import NDArray
+
+from mpam_calib.calibration import calibrate
+from mpam_calib.posterior.draws import reported
+from mpam_calib.posterior.likelihood.tensile_points import TENSILE_POINTS, gather_tensile
+from mpam_calib.posterior.tested_moduli import moduli_of_test
+from mpam_calib.specimen.recording import Specimen, Tensile
+
+Array = NDArray[np.float64]
+
+MODULI = np.array([4.0e4, 2.6e4])
+SIMULATION = {"moduli": "tensile", "order": 2, "law": "constant"}
+NOISE = 300.0
+"""Pa."""
+
+
+def pieces(rows: int, apart: float) -> Tensile:
+    """Two test pieces of ``rows`` readings each, one stiffer by a share ``apart``, one softer."""
+    rng = np.random.default_rng(1)
+    strain = np.linspace(0.01, 1.5, rows)
+    stress = strain[:, None] ** np.arange(1, 3) @ MODULI
+    each = [(1.0 + sign * apart) * stress + NOISE * rng.standard_normal(rows) for sign in (1.0, -1.0)]
+    return Tensile(np.tile(strain, 2), np.concatenate(each))
+
+
+def rubber(test: Tensile) -> Specimen:
+    return replace(build.specimen(SIMULATION, levels_kPa=()), tensile=test, geometry=None, braid=None)
+
+
+def first_sd(test: Tensile) -> float:
+    found = moduli_of_test(rubber(test))
+    assert found is not None
+    return float(np.sqrt(found.covariance[0][0]))
+
+
+def test_few_rows_are_taken_as_they_are() -> None:
+    test = pieces(TENSILE_POINTS // 2, 0.08)
+    points = gather_tensile(test, 0.0, 2.0)
+    order = np.argsort(test.strain, kind="stable")
+    assert np.array_equal(points.stress, test.stress_Pa[order]) and np.all(points.count == 1.0)
+    assert (points.within, points.rows) == (0.0, TENSILE_POINTS)
+
+
+@pytest.mark.parametrize("rows", [201, 333, 1000])
+def test_points_keep_the_sum_of_squares_about_a_straight_law(rows: int) -> None:
+    test = pieces(rows, 0.08)
+    points = gather_tensile(test, 0.0, 2.0)
+    share = points.rows / (2 * rows)
+    assert points.count.sum() == pytest.approx(points.rows) and len(points.strain) <= TENSILE_POINTS
+    for start, slope in ((0.0, 5e4), (2e3, 7e4)):
+        of_rows = np.sum((test.stress_Pa - start - slope * test.strain) ** 2)
+        of_points = points.count @ (points.stress - start - slope * points.strain) ** 2 + points.within
+        assert of_points == pytest.approx(share * of_rows, rel=1e-9)
+
+
+def test_noise_and_bands_do_not_depend_on_how_finely_two_pieces_are_read() -> None:
+    noise = []
+    for rows in (100, 2000):
+        test = pieces(rows, 0.08)
+        found = calibrate(rubber(test))
+        listed = {item.name: item.draws for item in reported(found.model, found.draws)}
+        noise.append(listed["tensile_noise_sd_Pa"].mean())
+        bands = found.bands()
+        bands = bands[bands["quantity"] == "stress_Pa_observed"]
+        low, high = (np.interp(test.strain, bands["contraction"], bands[q]) for q in ("q05", "q95"))
+        assert 0.85 < np.mean((test.stress_Pa >= low) & (test.stress_Pa <= high)) < 0.95
+    assert noise[1] == pytest.approx(noise[0], rel=0.2)
+
+
+def test_more_rows_of_the_same_pieces_tell_no_more_of_the_moduli() -> None:
+    few = first_sd(pieces(200, 0.08))
+    for rows in (400, 2000):
+        assert first_sd(pieces(rows, 0.08)) == pytest.approx(few, rel=0.1)
+
+
+def test_rows_that_differ_by_noise_alone_all_count() -> None:
+    for rows in (400, 2000):
+        assert gather_tensile(pieces(rows, 0.0), 0.0, 2.0).rows > 0.8 * 2 * rows
+    assert first_sd(pieces(2000, 0.0)) < 0.7 * first_sd(pieces(200, 0.0))
