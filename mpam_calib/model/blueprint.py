@@ -1,4 +1,4 @@
-"""All that a model is built from, and nothing of the data it will be fitted to but their design.
+"""All that a model is built from, and nothing of the data it will be fitted to but their design and scale.
 
 A blueprint is drawn once from a whole specimen. Folds, resumed runs and predictions build their models
 from it, so that all of them share one prior.
@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict
 from mpam_calib.model.pull import pulls_at
 from mpam_calib.model.reference import force_scale, geometric_contraction
 from mpam_calib.model.state import Setting
+from mpam_calib.model.tensile import STRESS_SCALE, stiffness_scale
 from mpam_calib.specimen.declaration import Braid, Geometry, Noise, Sensors, Simulation
 from mpam_calib.specimen.levels import same_level
 from mpam_calib.specimen.motion import run_ids
@@ -66,6 +67,7 @@ class Blueprint(Value):
     with a clear pull, ``stroke_time`` (s) the median duration of a stroke (None without loops),
     ``reading_time`` (s) that between two readings, ``duration`` (s) that of the whole test, ``level_time``
     (s) the longest at one level and ``speed`` (m/s) the geometric mean of the strokes' speeds.
+    ``tensile_stiffness`` (Pa at a strain of one) is the scale of what a tensile test is fitted with.
     """
 
     simulation: Simulation
@@ -87,6 +89,7 @@ class Blueprint(Value):
     free_contraction: bool
     tensile_range: tuple[float, float] | None
     tensile_tested: tuple[float, float] | None = None
+    tensile_stiffness: float = STRESS_SCALE
     material: MaterialPosterior | None = None
     options: Options = Options()
 
@@ -145,6 +148,7 @@ def draw_blueprint(
         free_contraction=specimen.free_contraction is not None,
         tensile_range=_tensile_range(specimen),
         tensile_tested=None if specimen.tensile is None else specimen.tensile.strain_range,
+        tensile_stiffness=_tensile_stiffness(specimen),
         material=material,
         options=options or Options(),
     )
@@ -198,6 +202,15 @@ def _tensile_range(specimen: Specimen) -> tuple[float, float] | None:
     if specimen.tensile is None:
         return None
     return specimen.fit.tensile_strain or specimen.tensile.strain_range
+
+
+def _tensile_stiffness(specimen: Specimen) -> float:
+    """The priors' scale by what is fitted of the tensile test, Pa at a strain of one."""
+    test, span = specimen.tensile, _tensile_range(specimen)
+    if test is None or span is None:
+        return STRESS_SCALE
+    inside = (test.strain >= span[0]) & (test.strain <= span[1])
+    return stiffness_scale(test.strain[inside], test.stress_Pa[inside])
 
 
 def _stroke_time(loops: Loops) -> float:

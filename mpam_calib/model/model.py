@@ -88,7 +88,9 @@ def build_model(blueprint: Blueprint) -> Model:
         and blueprint.material is None
         and (setting is None or simulation.moduli == "tensile")
     ):
-        tensile = TensileModel(*blueprint.tensile_range, simulation.order, simulation.strain)
+        tensile = TensileModel(
+            *blueprint.tensile_range, simulation.order, simulation.strain, blueprint.tensile_stiffness
+        )
     moduli = _moduli(blueprint, setting, tensile)
     extra: list[Parameter] = []
     remainder = None

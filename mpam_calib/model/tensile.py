@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 NOISE, MISFIT = "tensile_noise_sd_Pa", "tensile_remainder_sd_Pa"
 STRESS_SCALE = 1e6
-"""Pa at a strain of one, as the prior's scale: above every silicone rubber of the soft-robotics
+"""Pa at a strain of one, as the prior's least scale: above every silicone rubber of the soft-robotics
 materials database (Marechal et al. 2020, doi 10.1089/soro.2019.0115)."""
 NOISELESS = 1e-6
 """Least noise as a share of the prior's stress: computed readings have none, and would weigh too much."""
@@ -25,13 +25,15 @@ GRID_POINTS = 32
 class TensileModel:
     """σ(ε) = Σ E_k e^k + remainder, on a declared range of engineering strain (low, high).
 
-    e is the strain or the stretch 1 + ε, as the simulation declares.
+    e is the strain or the stretch 1 + ε, as the simulation declares. ``stiffness`` (Pa at a strain of one)
+    scales all priors.
     """
 
     low: float
     high: float
     order: int
     convention: str
+    stiffness: float = STRESS_SCALE
 
     def powers(self, strain: Array) -> Array:
         """Stress per unit of each modulus, (n, order)."""
@@ -45,7 +47,7 @@ class TensileModel:
     @property
     def scale(self) -> float:
         """Prior root mean square of the stress on the grid, Pa."""
-        return STRESS_SCALE * float(np.sqrt(np.mean(np.linspace(self.low, self.high, GRID_POINTS) ** 2)))
+        return self.stiffness * float(np.sqrt(np.mean(np.linspace(self.low, self.high, GRID_POINTS) ** 2)))
 
     def remainder(self, strain: Array) -> Array:
         """Half-waves along the strain range for amplitude 1 Pa, (n, HALF_WAVES), falling weights."""
@@ -69,3 +71,13 @@ class TensileModel:
                 "what the polynomial leaves of the stress, one sigma",
             ),
         )
+
+
+def stiffness_scale(strain: Array, stress: Array) -> float:
+    """The priors' scale, Pa at a strain of one, for a test (n,) in the declared range.
+
+    Where the rubber is stiffer than silicones are, it is the secant of its largest stress: the priors of such
+    a rubber are those of a softer one in other units.
+    """
+    top = float(strain.max(initial=0.0))
+    return max(STRESS_SCALE, float(np.abs(stress).max(initial=0.0)) / top) if top > 0.0 else STRESS_SCALE

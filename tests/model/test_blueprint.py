@@ -1,4 +1,7 @@
-"""A blueprint goes to JSON and back unchanged, and holds nothing of the forces but where pulling begins."""
+"""A blueprint goes to JSON and back unchanged, and holds nothing of the forces but where pulling begins.
+
+Of a tensile test's stresses it holds the scale, where the rubber is stiffer than silicones are.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from pydantic import ValidationError
 
 from mpam_calib.model.blueprint import Blueprint, MaterialPosterior, Options, draw_blueprint
 from mpam_calib.model.model import build_model
+from mpam_calib.model.tensile import STRESS_SCALE
 from mpam_calib.specimen.declaration import Fit, Geometry, GeometrySd, Noise, Sensors
 from mpam_calib.specimen.recording import FreeContraction, Loops, Tensile
 
@@ -140,6 +144,26 @@ def test_the_tensile_range():
     assert draw_blueprint(made).tensile_range == (0.0, 2.0)
     narrowed = replace(made, fit=Fit(tensile_strain=(0.1, 1.3)))
     assert draw_blueprint(narrowed).tensile_range == (0.1, 1.3)
+
+
+def test_the_stresses_of_a_usual_rubber_do_not_matter() -> None:
+    soft, strain = CASES["tensile"], TENSILE.strain
+    assert soft.tensile_stiffness == STRESS_SCALE == 1e6
+    for rise, scale in ((7e5, 1e6), (1.3e6, 1.3e6), (1e7, 1e7)):
+        drawn = build.blueprint(
+            {"moduli": "tensile", "order": 2, "law": "constant"},
+            tensile=Tensile(strain, np.where(strain <= 1.3, rise, 9e9) * strain),
+            fit=Fit(tensile_strain=(0.1, 1.3)),
+        )
+        assert drawn.tensile_stiffness == pytest.approx(scale)
+
+
+def test_a_blueprint_of_an_older_run_has_the_usual_scale() -> None:
+    drawn = CASES["tensile"]
+    text = drawn.model_dump_json()
+    older = text.replace('"tensile_stiffness":1000000.0,', "")
+    assert older != text
+    assert Blueprint.model_validate_json(older) == drawn
 
 
 @pytest.mark.parametrize(

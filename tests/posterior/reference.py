@@ -112,7 +112,7 @@ class Twin:
         if self.tensile:
             low, high = self.blueprint.tensile_range or (0.0, 0.0)
             strains = np.linspace(low, high, 32)
-            size = 1e6 * math.sqrt(float(np.mean(strains**2)))
+            size = self.blueprint.tensile_stiffness * math.sqrt(float(np.mean(strains**2)))
             grid = [self.stress_powers(float(e)) for e in strains]
             return np.array(plain.prior_root(grid, size))
         grid = []

@@ -66,3 +66,35 @@ def test_moduli_from_elsewhere_are_not_looked_for() -> None:
     free = {"order": 2, "law": "linear"}
     assert moduli_of_test(rubber(0, simulation=free)) is None
     assert moduli_of_test(replace(rubber(0), tensile=None, simulation=Simulation(**free))) is None
+
+
+def rising(size: float, top: float) -> Tensile:
+    """A test whose slope is ``size`` (Pa) at first, with 0.5 % noise."""
+    strain = np.linspace(top / 60.0, top, 60)
+    stress = size * strain * (1.0 - 0.3 * strain / top)
+    noise = 0.005 * stress.max() * np.random.default_rng(0).standard_normal(60)
+    return Tensile(strain, stress + noise)
+
+
+@pytest.mark.parametrize("top", [0.1, 1.5])
+@pytest.mark.parametrize("size", [5e4, 1e7, 5e7])
+def test_stiff_rubber_is_no_remainder(size: float, top: float) -> None:
+    test = rising(size, top)
+    found = moduli_of_test(replace(rubber(0, simulation=TENSILE | {"order": 2}), tensile=test))
+    assert found is not None
+    powers = test.strain[:, None] ** np.arange(1, 3)
+    plain = np.linalg.lstsq(powers, test.stress_Pa, rcond=None)[0]
+    off = np.array(found.mean) - plain
+    assert np.all(np.abs(off) < 3.0 * np.sqrt(np.diagonal(found.covariance)))
+    assert abs(off[0]) < 0.05 * plain[0]
+
+
+def test_stiff_rubbers_are_the_same_in_other_units() -> None:
+    each = []
+    for size in (1e7, 5e7):
+        made = replace(rubber(0, simulation=TENSILE | {"order": 2}), tensile=rising(size, 1.5))
+        found = moduli_of_test(made)
+        assert found is not None
+        each.append((np.array(found.mean) / size, np.array(found.covariance) / size**2))
+    np.testing.assert_allclose(each[1][0], each[0][0], rtol=1e-5)
+    np.testing.assert_allclose(each[1][1], each[0][1], rtol=1e-3)
