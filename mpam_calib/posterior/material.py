@@ -46,7 +46,8 @@ def material_of(specimen: Specimen) -> MaterialPosterior | None:
     return MaterialPosterior(
         mean=tuple(float(v) for v in draws.mean(axis=1)),
         covariance=tuple(tuple(float(v) for v in row) for row in np.atleast_2d(np.cov(draws))),
-        strain_range=blueprint.tensile_range,
+        # A muscle's run may have a tensile test beside it that its moduli owe nothing to.
+        strain_range=None if run.model.tensile is None else blueprint.tensile_range,
         convention=blueprint.simulation.strain,
     )
 

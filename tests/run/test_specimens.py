@@ -23,6 +23,7 @@ from .small import (
     map_text,
     static_force,
     stress_Pa,
+    tensile_text,
 )
 
 STATIC = SIMULATION.replace('friction = "coulomb"', 'friction = "none"')
@@ -174,10 +175,13 @@ def test_a_materials_run_gives_a_muscle_its_moduli(
     assert again.code == 0 and "kept" not in again.out
 
 
-def test_moduli_of_another_muscle_that_has_not_converged_are_told(tmp_path: Path, here: Here) -> None:
+@pytest.mark.parametrize("unused", [{}, {"tensile": tensile_text()}], ids=["alone", "beside a test"])
+def test_moduli_of_another_muscle_that_has_not_converged_are_told(
+    unused: dict[str, str], tmp_path: Path, here: Here
+) -> None:
     constant = SIMULATION.replace("linear", "constant")
     loops = loops_text(rows=60, moduli=MATERIAL)
-    first = Specimen(simulation=constant).write(tmp_path / "first", loops=loops)
+    first = Specimen(simulation=constant).write(tmp_path / "first", loops=loops, **unused)
     simulation = constant.replace('"loops"', '"run:../run"')
     second = Specimen(simulation=simulation).write(tmp_path / "second", loops=loops)
     run, after = tmp_path / "run", tmp_path / "after"
