@@ -155,22 +155,26 @@ def draw_blueprint(
 
 
 def _reach(specimen: Specimen) -> Array:
-    """Largest recorded contraction at each level (levels,)."""
+    """Largest recorded contraction at each level (levels,); between two levels' that of one without any."""
     levels = specimen.levels_Pa
-    reach = np.zeros(len(levels))
+    reach = np.full(len(levels), -np.inf)
     if specimen.geometry is None:
-        return reach
+        return np.zeros(len(levels))
     if (loops := specimen.loops) is not None:
         np.maximum.at(reach, loops.level, loops.displacement_m / specimen.geometry.L0)
     if (grid := specimen.force_map) is not None:
-        seen = ~grid.censored
-        np.maximum.at(reach, grid.level[seen], grid.contraction[seen])
+        # A slack reading reaches nowhere: its level is known not to pull.
+        np.maximum.at(reach, grid.level, np.where(grid.censored, 0.0, grid.contraction))
     if (free := specimen.free_contraction) is not None and len(levels):
         nearest = np.abs(free.pressure_Pa[:, None] - levels).argmin(axis=1)
         # Levels that loops or maps gave know nothing of what was seen far from them.
         own = loops is None and grid is None
         here = own | same_level(free.pressure_Pa, levels[nearest])
         np.maximum.at(reach, nearest[here], free.contraction[here])
+    known = np.isfinite(reach)
+    reach[:] = np.maximum(reach, 0.0)
+    if known.any():
+        reach[~known] = np.interp(levels[~known], levels[known], reach[known], left=0.0, right=0.0)
     return reach
 
 

@@ -15,7 +15,7 @@ from mpam_calib.model.blueprint import Blueprint, MaterialPosterior, Options, dr
 from mpam_calib.model.model import build_model
 from mpam_calib.model.tensile import STRESS_SCALE
 from mpam_calib.specimen.declaration import Fit, Geometry, GeometrySd, Noise, Sensors
-from mpam_calib.specimen.recording import FreeContraction, Loops, Tensile
+from mpam_calib.specimen.recording import BlockedForce, ForceMap, FreeContraction, Loops, Tensile
 
 from . import build
 
@@ -124,6 +124,31 @@ def test_a_free_contraction_far_from_all_levels_reaches_none():
     assert reach == pytest.approx((0.2 * 11.5 / 12, 0.25))
     alone = build.specimen(None, None, levels_kPa=(200.0, 390.0), free_contraction=free)
     assert draw_blueprint(alone).reach == pytest.approx((0.25, 0.35))
+
+
+def test_a_level_without_contractions_reaches_as_far_as_its_neighbours() -> None:
+    """Blocked forces every 10 kPa, free contractions every 50: between these nothing is extrapolated."""
+    pressures = np.arange(0.0, 251e3, 10e3)
+    blocked = BlockedForce(pressures, 2e-4 * pressures, np.zeros(26, dtype=bool))
+    free = FreeContraction(np.arange(50e3, 201e3, 50e3), np.array([0.06, 0.14, 0.2, 0.24]))
+    made = build.specimen(
+        None, None, levels_kPa=tuple(pressures / 1e3), blocked_force=blocked, free_contraction=free
+    )
+    reach = np.array(draw_blueprint(made).reach)
+    between = (pressures >= 50e3) & (pressures <= 200e3)
+    assert reach[between] == pytest.approx(
+        np.interp(pressures[between], free.pressure_Pa, free.contraction), abs=1e-12
+    )
+    assert not reach[~between].any()
+
+
+def test_a_level_that_is_slack_everywhere_reaches_nowhere() -> None:
+    P, gamma = (x.ravel() for x in np.meshgrid([5e4, 1e5, 1.5e5], [0.0, 0.1, 0.2], indexing="ij"))
+    level = np.repeat([0, 1, 2], 3)
+    slack = level == 1
+    grid = ForceMap(P, gamma, np.where(slack, 0.0, 9.0), level, np.zeros(9, dtype=np.int64), slack)
+    made = build.specimen(None, None, levels_kPa=(50.0, 100.0, 150.0), force_map=grid)
+    assert draw_blueprint(made).reach == (0.2, 0.0, 0.2)
 
 
 def test_stroke_reach_and_times():

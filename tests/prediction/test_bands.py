@@ -17,7 +17,7 @@ from mpam_calib.posterior.likelihood.covariance import ROUGH_LENGTH
 from mpam_calib.prediction.bands import _table, muscle_bands
 from mpam_calib.prediction.curves import Reach, force_curves
 from mpam_calib.prediction.fitted import noise_of
-from mpam_calib.specimen.recording import FreeContraction
+from mpam_calib.specimen.recording import BlockedForce, FreeContraction
 
 DRAWS = 2000
 LEVELS = np.array([1e5, 1.5e5, 2e5])
@@ -117,6 +117,20 @@ def test_pressures_more_than_a_hundredth_of_the_highest_outside_the_levels_are_e
     assert reach.outside(asked).tolist() == [True, False, False, False, True]
     assert reach.at(np.array([1.25e5])) == pytest.approx([0.225])
     assert reach.beyond(np.array(1.25e5), np.array([0.22, 0.25])).tolist() == [False, True]
+
+
+def test_pressures_between_free_contractions_are_not_extrapolated() -> None:
+    """Blocked forces every 10 kPa make levels that no contraction was read at."""
+    pressures = np.arange(0.0, 251e3, 10e3)
+    blocked = BlockedForce(pressures, 2e-4 * pressures, np.zeros(26, dtype=bool))
+    free = FreeContraction(np.arange(50e3, 251e3, 50e3), np.array([0.06, 0.14, 0.2, 0.24, 0.26]))
+    made = build.specimen(
+        None, None, levels_kPa=tuple(pressures / 1e3), blocked_force=blocked, free_contraction=free
+    )
+    reach = Reach.of(draw_blueprint(made))
+    for P in (1e5, 1.2e5, 1.25e5, 1.5e5):
+        assert not reach.beyond(np.array(P), np.array(0.05))
+        assert reach.beyond(np.array(P), np.array(0.25))
 
 
 def test_noise_of_a_reading_is_white_and_correlated() -> None:
