@@ -222,16 +222,20 @@ class ModuliBlock:
         """Number of coordinates η."""
         return self.law.terms * self.law.order if self.root is None else self.root.shape[1]
 
+    @property
+    def fixed(self) -> bool:
+        """Whether the coefficients' prior is the same for all values: the law has no rates of its own."""
+        return self.root is not None or self.law.name in ("constant", "linear", "free")
+
     def transform(self, values: Values) -> tuple[Array, Array]:
         """(mean (1, q), transform (B or 1, q, p)): coefficients = mean + transform·η."""
         if self.root is not None and self.mean is not None:
             return self.mean[None, :], self.root[None, :, :]
-        fixed = self.law.name in ("constant", "linear", "free")
-        if fixed and "transform" in self._cache:
+        if self.fixed and "transform" in self._cache:
             matrix = self._cache["transform"]
         else:
             matrix = self._newton_transform(values)
-            if fixed:
+            if self.fixed:
                 self._cache["transform"] = matrix
         return np.zeros((1, matrix.shape[1])), matrix
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.model import Model
+from mpam_calib.model.moduli import ModuliBlock
 from mpam_calib.posterior.chains.sampling import Sampling
 from mpam_calib.posterior.density.batch import batch_size
 from mpam_calib.posterior.density.collapsed import Collapsed
@@ -106,7 +107,7 @@ def reported(model: Model, draws: Draws, seed: int = 0) -> list[Reported]:
         level = name.partition("@")[2]
         factor = si_factor(name)
         if name.split("_")[0] in ("d", "gap") and parameter.unit == "1/kPa":
-            found += _rate(model, draws, name, seed)
+            found.append(_rate(model, draws, name))
             continue
         found.append(
             Reported(
@@ -127,8 +128,7 @@ def _coefficients(model: Model, draws: Draws, seed: int) -> list[Reported]:
     p = model.linear_sizes[0]
     law = model.moduli.law
     posterior = model.moduli.coefficients(draws.eta[:, :p], draws.values)
-    u, eta = _prior(model, seed)
-    prior = model.moduli.coefficients(eta, model.values(u)).std(axis=0)
+    prior = _coefficient_sds(model, model.moduli, seed)
     return [
         Reported(name, unit, posterior[:, i] / factor, float(prior[i] / factor), False, meaning)
         for i, (name, (unit, factor), meaning) in enumerate(
@@ -137,20 +137,28 @@ def _coefficients(model: Model, draws: Draws, seed: int) -> list[Reported]:
     ]
 
 
-def _rate(model: Model, draws: Draws, name: str, seed: int) -> list[Reported]:
+def _coefficient_sds(model: Model, moduli: ModuliBlock, seed: int) -> Array:
+    """Prior sds (q,) of the law's coefficients, SI: exact but where they depend on rates that are sampled."""
+    u, eta = _prior(model, seed)
+    if moduli.fixed:
+        _, transform = moduli.transform(model.values(u[:1]))
+        return np.asarray(np.sqrt(np.sum(transform[0] ** 2, axis=-1)))
+    return np.asarray(moduli.coefficients(eta, model.values(u)).std(axis=0))
+
+
+def _rate(model: Model, draws: Draws, name: str) -> Reported:
     """d as it is; in place of the gap, z = d − gap (thesis Eq. 4.8), both in 1/kPa."""
     stem, _, order = name.partition("_")
-    other = f"d_{order}" if order else "d"
-    printed = name if stem == "d" else (f"z_{order}" if order else "z")
-    prior = model.values(_prior(model, seed)[0])
-
-    def rate(values: dict[str, Array]) -> Array:
-        return (values[name] if stem == "d" else values[other] - values[name])[:, 0] * KPA
-
-    meaning = (
-        f"{'faster' if stem == 'd' else 'slower'} rate of {f'modulus E_{order}' if order else 'the law'}"
+    whose = f"modulus E_{order}" if order else "the law"
+    sd = {parameter.name: parameter.prior.sd * KPA for parameter in model.parameters}
+    rate = draws.values[name][:, 0] * KPA
+    if stem == "d":
+        return Reported(name, "1/kPa", rate, sd[name], True, f"faster rate of {whose}")
+    other, printed = (f"d_{order}", f"z_{order}") if order else ("d", "z")
+    rate = draws.values[other][:, 0] * KPA - rate
+    return Reported(
+        printed, "1/kPa", rate, float(np.hypot(sd[other], sd[name])), False, f"slower rate of {whose}"
     )
-    return [Reported(printed, "1/kPa", rate(draws.values), float(rate(prior).std()), stem == "d", meaning)]
 
 
 def _prior(model: Model, seed: int, count: int = 2000) -> tuple[Array, Array]:
