@@ -61,9 +61,11 @@ def level_labels(levels: Sequence[float] | NDArray[np.float64]) -> list[str]:
     ['50', '100']
     >>> level_labels([12.1e3, 12.4e3])
     ['12.1', '12.4']
+    >>> level_labels([-200.0, 50e3])
+    ['0', '50']
     """
     for decimals in range(DECIMALS):
-        labels = [f"{level / KPA:.{decimals}f}" for level in levels]
+        labels = [f"{level / KPA:z.{decimals}f}" for level in levels]
         if len(set(labels)) == len(labels):
             return labels
     raise ValueError(f"levels that are not apart: {levels}")

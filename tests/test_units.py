@@ -40,3 +40,9 @@ def test_levels_have_as_many_decimals_as_tell_them_apart() -> None:
     assert level_labels([100.01e3, 100.04e3, 200e3]) == ["100.01", "100.04", "200.00"]
     with pytest.raises(ValueError, match="not apart"):
         level_labels([100e3, 100e3])
+
+
+def test_a_level_next_to_nothing_has_no_sign() -> None:
+    assert level_labels([-200.0, 50e3]) == ["0", "50"]
+    assert level_labels([-200.0, 200.0]) == ["-0.2", "0.2"]
+    assert level_labels([-600.0, 50e3]) == ["-1", "50"]
