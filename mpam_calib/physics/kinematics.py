@@ -168,7 +168,7 @@ SHAPES = {
     "braid_of_thin_wall": shape_braid_of_thin_wall,
     "braid_of_thin_section": shape_braid_of_thin_section,
 }
-"""The two kinematics by their declared names, and two that an effect asks for."""
+"""The two kinematics by their declared names, and three that an effect asks for."""
 
 NEWTON_STEPS = 6
 FLATTEST = 0.1
