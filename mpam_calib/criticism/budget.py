@@ -78,7 +78,7 @@ def _noise(problem: Problem, fitted: Fit) -> float:
 
 def _at_word(found: Search, causes: Set) -> dict[Set, float]:
     """Mean square (N²) that the equations of each part of a set leave by themselves, smaller parts first."""
-    found.refit(causes, 0)
+    found.refit_all([(causes, 0)])
     best = found.best_fit(causes)
     forms = named_forms(best)
     parts = [frozenset(p) for k in range(len(causes) + 1) for p in combinations(sorted(causes), k)]

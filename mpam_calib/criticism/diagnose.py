@@ -14,7 +14,7 @@ from mpam_calib.criticism.fitting.noise_scale import settle_guess
 from mpam_calib.criticism.gain import Gain, measure_gain
 from mpam_calib.criticism.limits import Band, hidden_sizes
 from mpam_calib.criticism.searching.candidates import Candidates, candidates
-from mpam_calib.criticism.searching.search import search
+from mpam_calib.criticism.searching.search import open_search
 from mpam_calib.criticism.searching.searched import LARGEST, Search
 from mpam_calib.criticism.searching.usual_braid import SHAPE_ALONE, need_strands, with_strands
 from mpam_calib.criticism.sizes import Sizes, Told, sizes_of
@@ -98,15 +98,15 @@ def diagnose(
     if problem.noise_guessed:
         sets = [frozenset[str](), *(frozenset({e}) for e in tested.tested)]
         problem = settle_guess(problem, [extended(problem.blueprint, s) for s in sets])
-    found = search(problem, tested.tested, partial(listener, "searching"), workers=WORKERS, journal=journal)
-    problem = found.problem  # its noise settled by the best set
-    verdict = judge(found)
-    for size in range(len(SIZES)):
-        found.refit(verdict.standing, size)
-    # Its likeliest form first: budget, gain and extended model are all made from it.
-    with journalled(problem, WORKERS, journal) as spread:
-        found.refit_in_forms([verdict.standing], spread)
-    budget = misfit_budget(found, verdict.standing)
+    with open_search(
+        problem, tested.tested, partial(listener, "searching"), workers=WORKERS, journal=journal
+    ) as found:
+        problem = found.problem  # its noise settled by the best set
+        verdict = judge(found)
+        found.refit_all((verdict.standing, size) for size in range(len(SIZES)))
+        # Its likeliest form first: budget, gain and extended model are all made from it.
+        found.refit_in_forms([verdict.standing])
+        budget = misfit_budget(found, verdict.standing)
     gain = None
     if verdict.standing:
         named = found.fits[verdict.standing, found.best_size(verdict.standing)]

@@ -20,7 +20,7 @@ from mpam_calib.criticism.fitting.folds import FEWEST, Z90, folds_of, log_densit
 from mpam_calib.criticism.fitting.predicted import predict_rows
 from mpam_calib.criticism.fitting.refits import Set, causes_of
 from mpam_calib.criticism.searching.candidates import HISTORY
-from mpam_calib.criticism.searching.search import search
+from mpam_calib.criticism.searching.search import open_search
 from mpam_calib.criticism.tasks.journal import Journal
 from mpam_calib.criticism.verdict import judge
 
@@ -78,7 +78,8 @@ def measure_gain(
     """
     causes = causes_of(named)
     cycles, levels = problem.cycles, np.unique(problem.level)
-    by_cycle = len(cycles) >= FEWEST and (bool(causes & set(HISTORY)) or len(levels) < FEWEST)
+    told_by_cycles = bool(causes & set(HISTORY)) or _own_at_each_level(problem)
+    by_cycle = len(cycles) >= FEWEST and (told_by_cycles or len(levels) < FEWEST)
     groups, labels = (problem.cycle, cycles) if by_cycle else (problem.level, levels)
     if len(labels) < FEWEST:
         return None
@@ -111,6 +112,12 @@ def measure_gain(
     )
 
 
+def _own_at_each_level(problem: Problem) -> bool:
+    """Whether the simulation has moduli or friction of each level's own, which no other level predicts."""
+    simulation = problem.blueprint.simulation
+    return simulation.law == "free" or (simulation.friction != "none" and simulation.friction_by_pressure)
+
+
 def _fold(
     problem: Problem,
     tested: tuple[str, ...],
@@ -122,17 +129,18 @@ def _fold(
 ) -> _Fold:
     held = np.isin(groups, part)
     # Workers share one fold's search: three folds on two workers would leave one idle.
-    found = search(
+    with open_search(
         problem.take(~held), tested, width=FOLD_WIDTH, workers=workers, settle=False, journal=journal
-    )
-    # What a verdict on these rows alone would report: in "unexplained", only what stands even so.
-    chosen = judge(found).standing
-    found.refit_all((chosen, size) for size in range(len(SIZES)))
+    ) as found:
+        # What a verdict on these rows alone would report: in "unexplained", only what stands even so.
+        chosen = judge(found).standing
+        found.refit_all((chosen, size) for size in range(len(SIZES)))
+        # In the forms of all rows: those that tell them apart may be the very rows held out.
+        in_its_forms = found.refit_like(named)
     index = (np.flatnonzero(~held), np.flatnonzero(held))
     chosen_fits = [found.fits[e, found.best_size(e)] for e in (frozenset[str](), chosen)]
-    # In the forms of all rows: those that tell them apart may be the very rows held out. No climb may have
-    # an end without these rows.
-    fits = [*chosen_fits, found.refit_like(named) or chosen_fits[-1]]
+    # No climb may have an end without these rows.
+    fits = [*chosen_fits, in_its_forms or chosen_fits[-1]]
     results = [predict_rows(problem, fitted, index) for fitted in fits]
     residuals = [problem.force[held] - mean for mean, _ in results]
     covariances = [covariance for _, covariance in results]

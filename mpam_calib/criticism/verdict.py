@@ -156,8 +156,11 @@ def _outweighing(found: Search, effects: Set) -> Set:
 
 
 def _left(found: Search, effects: Set) -> float:
-    """Mean square (N²) of the misfit that the causes' equations leave."""
-    return structured(found.problem, by_equations(found.problem, found.refit(effects, 0)))
+    """Mean square (N²) of the misfit that the causes' equations leave; infinite where no climb ends."""
+    try:
+        return structured(found.problem, by_equations(found.problem, found.refit(effects, 0)))
+    except np.linalg.LinAlgError:
+        return np.inf
 
 
 def _standing(found: Search, leading: Set) -> Set:
@@ -168,8 +171,7 @@ def _standing(found: Search, leading: Set) -> Set:
     proportion (quasi-likelihood: McCullagh and Nelder 1989, chapter 9).
     """
     largest = len(SIZES) - 1
-    for e in leading:
-        found.refit(leading - {e}, largest)
+    found.refit_all((leading - {e}, largest) for e in leading)
     scores = {
         s: f.log_evidence + found.log_prior(s) for (s, size), f in found.fits.items() if size == largest
     }

@@ -79,3 +79,19 @@ def test_of_two_levels_cycles_are_left_out(null_problem: Problem) -> None:
 
 def test_bands_are_no_wider_than_they_need_be(null_problem: Problem) -> None:
     assert covered(null_problem, 0) == pytest.approx(0.9, abs=0.06)
+
+
+@pytest.mark.parametrize("own", [{"law": "free", "moduli": "loops"}, {"friction_by_pressure": True}])
+def test_of_what_each_level_has_of_its_own_cycles_are_left_out(
+    null_problem: Problem, own: dict[str, object]
+) -> None:
+    """Another level's moduli or friction say nothing of a level left out: its prior alone would be scored."""
+    declared = null_problem.blueprint.simulation.model_dump() | {"friction": "coulomb"} | own
+    simulation = type(null_problem.blueprint.simulation)(**declared)
+    blueprint = null_problem.blueprint.model_copy(update={"simulation": simulation})
+    problem = replace(null_problem, blueprint=blueprint)
+    named = fit(problem, frozenset({"length_offset"}), 0)
+    gain = measure_gain(problem, ("length_offset",), named)
+    assert gain is not None
+    assert gain.held_out == "cycle"
+    assert gain.rmse_before < 3.0 * problem.noise_level.total

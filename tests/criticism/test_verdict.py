@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -269,3 +269,24 @@ def test_a_load_cell_that_comes_near_takes_the_name_and_what_it_replaces(
     verdict = judge(found)
     assert (verdict.word, verdict.standing) == (word, standing)
     assert verdict.load_cell == (None if word == "named" else rival)
+
+
+def test_a_part_that_no_climb_can_fit_does_not_end_a_diagnosis(
+    problem: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is left of it to compare with: the set that leads has no such rival."""
+    found = search_where_the_cause_leaves(problem, 0.9)
+    pair = CAUSE | {"dead_band"}
+    found.tested = tuple(pair)
+    for size in range(len(SIZES)):
+        before = found.fits[CAUSE, size]
+        found.fits[pair, size] = replace(before, log_evidence=before.log_evidence + 60.0)
+    kept = found.refit_all
+
+    def refit_all(keys: Iterable[tuple[frozenset[str], int]]) -> None:
+        kept(key for key in keys if key[0] != frozenset({"dead_band"}))
+
+    monkeypatch.setattr(found, "refit_all", refit_all)
+    assert verdict_module._left(found, frozenset({"dead_band"})) == np.inf
+    assert verdict_module._standing(found, pair) <= pair
+    assert verdict_module._outweighing(found, pair) <= pair

@@ -142,7 +142,7 @@ def _mode(seen: list[Windows], averaged: int, model: Model) -> NoiseLevel:
         noise = level(u, reading)
         return float(0.5 * u @ u) - sum(_log_likelihood(w, noise, averaged, scale) for w in usual)
 
-    usual = [windows.usual(GROWTH in names) for windows in seen]
+    usual = [_paced(windows.usual(GROWTH in names)) for windows in seen]
     # Left to itself the search starts with steps of 0.00025 at zero, and ends there.
     start = np.zeros(len(names))
     simplex = np.concatenate([start[None], np.eye(len(names))])
@@ -162,22 +162,35 @@ def _mode(seen: list[Windows], averaged: int, model: Model) -> NoiseLevel:
 def _lost(told: _Told, noise: NoiseLevel, averaged: int, model: Model) -> float:
     """Nats that windows lose by another noise than their own."""
     scale = 1.0 if model.setting is None else model.setting.force_scale
-    usual = told.windows.usual(GROWTH in model.names)
+    usual = _paced(told.windows.usual(GROWTH in model.names))
     own, other = (_log_likelihood(usual, n, averaged, scale) for n in (told.level, noise))
     return own - other
 
 
-def _log_likelihood(windows: Windows, noise: NoiseLevel, averaged: int, scale: float) -> float:
+class _Paced(NamedTuple):
+    """Windows of one pace, and what no noise changes: their scatter, and their time steps (s)."""
+
+    windows: Windows
+    scatter: tuple[Array, int, Array, float]
+    steps: list[float]
+
+
+def _paced(windows: Windows) -> list[_Paced]:
+    """Windows parted by pace, once for all the noises that they are asked about."""
+    # A difference of two strokes has noise of both, each at its own pace.
+    steps = [(some, np.unique(np.median(some.dt, axis=0)).tolist()) for some in windows.paces()]
+    return [_Paced(some, some.scatter(own[0]), own) for some, own in steps]
+
+
+def _log_likelihood(parts: list[_Paced], noise: NoiseLevel, averaged: int, scale: float) -> float:
     """Log likelihood (nats) of what usual windows see; growth is stated for the force ``scale``, N."""
     sizes = [np.array([size]) for size in (noise.white, noise.correlated, noise.time)]
     total = 0.0
-    for some in windows.paces():
-        # A difference of two strokes has noise of both, each at its own pace.
-        steps = [noise.reading] if noise.reading else np.unique(np.median(some.dt, axis=0))
-        seen = [some.scatter(float(dt)) for dt in steps]
+    for some, scatter, steps in parts:
+        seen = [(*scatter[:3], dt) for dt in ([noise.reading] if noise.reading else steps)]
         covariance = np.mean([fast_noise_covariance(s, averaged, *sizes) for s in seen], axis=0)
         if noise.growth == 0.0:
-            total += float(scatter_log_likelihood(*seen[0][:2], covariance)[0])
+            total += float(scatter_log_likelihood(*scatter[:2], covariance)[0])
         else:
             grows = grown(np.array([[noise.growth]]), some.force, scale)
             total += float(chunk_log_likelihood(covariance, some.chunks, grows)[0])

@@ -24,8 +24,11 @@ WINDOW, LONG_WINDOW, DEGREE = 32, 48, 3
 """Windows of at most so many rows, of one stroke or of two, detrended by a polynomial of this degree ..."""
 SHORT_DEGREE = 5
 """... or of this one, where a stroke is so short that it is one window."""
-USUAL = 4.0
-"""Multiple of the typical power above which a window holds more than noise."""
+USUAL, SELDOM = 4.0, 1e-3
+"""Multiple of the typical power above which a window holds more than noise, where white noise alone exceeds
+it less often than this; few readings scatter more."""
+FEWEST_TELL = 40
+"""Contrasts of short strokes that are enough to tell their noise from."""
 CURVE_DEGREE, CURVE_ROWS = 12, 8
 """Degree of the curve that strokes share, and readings for each degree."""
 FEWEST_PAIRS = 6
@@ -56,8 +59,9 @@ class Windows(NamedTuple):
         """
         if grows:
             return self.take(usual_chunks(self.chunks, self.force))
-        power = np.mean(self.chunks**2, axis=1)
-        return self.take(power <= USUAL * np.median(power))
+        power, dof = np.mean(self.chunks**2, axis=1), self.chunks.shape[1]
+        chance = stats.chi2.isf(SELDOM, dof) / stats.chi2.median(dof)
+        return self.take(power <= max(USUAL, chance) * np.median(power))
 
     def paces(self) -> list[Windows]:
         """The windows parted by their time steps, which strokes at two speeds may have one each of."""
@@ -86,9 +90,13 @@ def inside_strokes(loops: Loops, degree: int = DEGREE) -> Windows | None:
 
 
 def whole_strokes(loops: Loops) -> Windows | None:
-    """Short strokes as one window each; a stiffer curve is taken out, since far rows see the muscle's own."""
+    """Short strokes as one window each; a stiffer curve is taken out, since far rows see the muscle's own.
+
+    None where they are too few to tell: the median of a handful leaves out those with the most noise.
+    """
     size = min(WINDOW, int(np.quantile(loops.strokes[1], 0.25)))
-    return None if size < SHORT_DEGREE + 3 else _cut(loops, size, 0, SHORT_DEGREE)
+    windows = None if size < SHORT_DEGREE + 3 else _cut(loops, size, 0, SHORT_DEGREE)
+    return None if windows is None or windows.chunks.size < FEWEST_TELL else windows
 
 
 def _cut(loops: Loops, size: int, margin: int, degree: int) -> Windows | None:

@@ -31,7 +31,7 @@ from mpam_calib.posterior.likelihood.points import gather_points
 from mpam_calib.posterior.tested_moduli import moduli_of_test
 from mpam_calib.specimen.extremes import saturated
 from mpam_calib.specimen.recording import Specimen
-from mpam_calib.specimen.summary import noise_within
+from mpam_calib.specimen.summary import force_noise
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -280,9 +280,8 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         n = len(bins)
         keep = np.flatnonzero(~bins.slack & np.isin(bins.segment, looked_at))
         if noise is None:
-            found = np.nan_to_num(noise_within(bins.force, bins.segment), nan=NOISE_UNKNOWN)
-            guess = model.setting.force_sd or float(found)
-            noise = NoiseLevel(guess, 0.0, 1.0)
+            guess = model.setting.force_sd or float(np.nan_to_num(force_noise(loops.clear)))
+            noise = NoiseLevel(guess or NOISE_UNKNOWN, 0.0, 1.0)
         layout = StrokeCovariance.build(bins)
         if noise.reading:
             layout = replace(layout, dt=np.full_like(layout.dt, noise.reading))

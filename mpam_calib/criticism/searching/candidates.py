@@ -63,7 +63,9 @@ def _why_not(identifier: str, problem: Problem) -> str | None:
         if not len(speed) or speed.max() < SPEEDS_APART * speed.min():
             return "one speed"
     levels = len(np.unique(problem.level))
-    if levels < LEVELS.get(identifier, 1):
+    # A law that is no more than constant is bent by two levels already.
+    constant = identifier == "law_shape" and simulation.law == "constant"
+    if levels < LEVELS.get(identifier, 1) - constant:
         return f"{levels} pressure level" + ("s" if levels > 1 else "")
     if identifier in ("law_shape", "order_too_low") and simulation.law == "free":
         return "the law is free at every level" if identifier == "law_shape" else None

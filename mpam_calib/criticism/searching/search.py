@@ -7,7 +7,8 @@ the end the leading sets are refitted with a doubt about their forms
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from itertools import combinations
 
 from mpam_calib.criticism.data.problem import SIZES, Problem
@@ -41,7 +42,22 @@ def search(
     settle: bool = True,
     journal: Journal | None = None,
 ) -> Search:
-    """Search sets of up to three effects, the remainder always in play.
+    """:func:`open_search`, whose workers are gone."""
+    with open_search(problem, tested, listener, width, workers, settle, journal) as found:
+        return found
+
+
+@contextmanager
+def open_search(
+    problem: Problem,
+    tested: tuple[str, ...],
+    listener: Callable[[float], None] | None = None,
+    width: int = WIDTH,
+    workers: int = 1,
+    settle: bool = True,
+    journal: Journal | None = None,
+) -> Iterator[Search]:
+    """Search sets of up to three effects, the remainder always in play; the workers stay for what is asked.
 
     Singles are refitted for every size of the remainder; kept sets are extended by the most promising
     partners, refitted exactly, and pruned again. Then the best set says how small the noise is, unless that
@@ -49,24 +65,29 @@ def search(
     what is in the ``journal`` is not done again.
     """
     tell = listener or (lambda share: None)
-    with journalled(problem, workers, journal) as spread:
-        found = Search(problem, tested, spread)
-        _grow(found, width, tell)
-        if not settle:
-            _finish(found, width, tell)
+    before: Search | None = None
     if settle:
-        best = found.sets[0]
-        fits = [f for (effects, _), f in found.fits.items() if effects == best]
+        with journalled(problem, workers, journal) as spread:
+            before = Search(problem, tested, spread)
+            _grow(before, width, tell)
+        best = before.sets[0]
+        fits = [f for (effects, _), f in before.fits.items() if effects == best]
         # Never up: what is left beyond the noise may be a cause that the best set still lacks.
         scale = min(noise_scale(problem, fits), 1.0)
-        settled = problem.with_noise_scale(scale)
-        with journalled(settled, workers, journal) as spread:
-            before, found = found, found.on(settled, spread)
+        problem = problem.with_noise_scale(scale)
+    with journalled(problem, workers, journal) as spread:
+        if before is None:
+            found = Search(problem, tested, spread)
+            _grow(found, width, tell)
+        else:
+            found = before.on(problem, spread)
             if scale > MUCH_LESS:
                 found.polished = {k: True for k, stayed in before.polished.items() if stayed}
-            _finish(found, width, tell)
-    found.spread = Alone(found.problem)
-    return found
+        _finish(found, width, tell)
+        try:
+            yield found
+        finally:
+            found.spread = Alone(problem)
 
 
 def _grow(found: Search, width: int, tell: Callable[[float], None]) -> None:

@@ -215,8 +215,9 @@ class Search:
 
     def polish_near(self) -> None:
         """Polish all that may yet lead: in the bent forms of the search a true set may trail some nats."""
-        near = [s for s in self.sets[:POLISHED] if self.score(s) > self.score(self.sets[0]) - NEAR]
-        self.polish_all((s, self.best_size(s)) for s in near)
+        sets = self.sets[:POLISHED]
+        least = self.score(sets[0]) - NEAR
+        self.polish_all((s, self.best_size(s)) for s in sets if self.score(s) > least)
 
     def doubt(self, leading: int, further: bool = True) -> None:
         """Refit so many leading sets, and the best of each number of effects, with a doubt of their forms.
@@ -250,13 +251,14 @@ class Search:
         found one after the other need not be the likeliest. What has ``further`` causes than the first may
         be left as it is.
         """
-        first = self.sets[0]
-        least = self.score(first) - NEAR
-        listed = [s for s in self.sets if further or not s > first]
+        sets = self.sets
+        least = self.score(sets[0]) - NEAR
+        listed = [s for s in sets if further or not s > sets[0]]
         near = [s for s in listed if self.score(s) > least and bends(self.best_fit(s))][:IN_PAIRS]
         self.in_two_other_equations(near)
-        least = self.score(self.sets[0]) - CLOSE
-        listed = [s for s in self.sets if further or not s > self.sets[0]]
+        sets = self.sets
+        least = self.score(sets[0]) - CLOSE
+        listed = [s for s in sets if further or not s > sets[0]]
         self.refit_in_forms([s for s in listed if self.score(s) > least][:IN_ALL_FORMS])
 
     def in_two_other_equations(self, sets: Iterable[Set]) -> None:
@@ -271,13 +273,13 @@ class Search:
             if fit.log_evidence > self.fits[effects, fit.size].log_evidence:
                 self.fits[effects, fit.size] = fit
 
-    def refit_in_forms(self, sets: Iterable[Set], spread: Spread | None = None) -> None:
+    def refit_in_forms(self, sets: Iterable[Set]) -> None:
         """Refit sets with one of their effects in another form, doubted; from the likeliest once more."""
         bases = {s: self.best_fit(s) for s in sets if s not in self.in_forms}
         for _turn in range(TURNS):
             tasks = [(base, form) for base in bases.values() for form in other_forms(base)]
             found = {s: [base] for s, base in bases.items()}
-            for (base, _), fit in zip(tasks, (spread or self.spread)(in_another_form, tasks), strict=True):
+            for (base, _), fit in zip(tasks, self.spread(in_another_form, tasks), strict=True):
                 if fit is not None:
                     found[causes_of(base)].append(fit)
             self.in_forms |= {s: tuple(fits) for s, fits in found.items()}

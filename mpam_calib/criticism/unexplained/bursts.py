@@ -23,8 +23,9 @@ FEWEST, READINGS_EACH, DEGREE = 10, 8, 6
 """Readings of a stroke that is looked at, those to each degree of the curve taken out of it, most degrees."""
 TURNS = 0.05
 """Share of a stroke next to each turn that is not looked at."""
-WIDTHS = (1, 3, 6)
-"""Consecutive readings that are looked at together."""
+WIDTHS, AS_LONG = (1, 3, 6), 5
+"""Consecutive readings that are looked at together, and how many times as long a stroke then is at least: of
+a shorter one the curve that is taken out has most of their mean, but for those at its ends."""
 OUTSTANDING = 6.0
 """Standard deviations of such means beyond which readings are no noise: one in 5·10⁸."""
 HALF_WAY, FEWER = 3.0, 3.0
@@ -49,13 +50,17 @@ def bursts_rms(rows: Rows, residual: Array, sd: Array) -> float:
     # What other strokes have at the same place, too, is no burst, however sharp.
     own = [piece - usual for alike in groups for piece, usual in zip(alike, _of_others(alike), strict=True)]
     stand_out = np.zeros(len(every), dtype=bool)
+    length = np.concatenate([np.full(len(piece), len(piece)) for piece in left])
     for width in WIDTHS:
+        told = length >= AS_LONG * width
+        if not told.any():
+            continue
         most = np.inf if width == 1 else OUTSTANDING * SD * float(np.median(np.abs(every)))
         here, beside = (np.concatenate([_mean(piece, width, most) for piece in kind]) for kind in (left, own))
         if width == 1 and _tails(here):
             continue
-        least = OUTSTANDING * SD * np.median(np.abs(here))
-        high = (np.abs(here) > least) & (np.abs(beside) > least) & (here * beside > 0.0)
+        least = OUTSTANDING * SD * np.median(np.abs(here[told]))
+        high = told & (np.abs(here) > least) & (np.abs(beside) > least) & (here * beside > 0.0)
         stand_out |= ndimage.maximum_filter1d(high, width)
     share = float(np.sqrt(np.mean(np.where(stand_out, every, 0.0) ** 2)))
     noise = SD * float(np.median(np.abs(every)))
