@@ -43,7 +43,7 @@ def first_sd(test: Tensile) -> float:
 
 
 def test_few_rows_are_taken_as_they_are() -> None:
-    test = pieces(TENSILE_POINTS // 2, 0.08)
+    test = pieces(TENSILE_POINTS // 2, 0.0)
     points = gather_tensile(test, 0.0, 2.0)
     order = np.argsort(test.strain, kind="stable")
     assert np.array_equal(points.stress, test.stress_Pa[order]) and np.all(points.count == 1.0)
@@ -72,7 +72,7 @@ def test_noise_and_bands_do_not_depend_on_how_finely_two_pieces_are_read() -> No
         bands = found.bands()
         bands = bands[bands["quantity"] == "stress_Pa_observed"]
         low, high = (np.interp(test.strain, bands["contraction"], bands[q]) for q in ("q05", "q95"))
-        assert 0.85 < np.mean((test.stress_Pa >= low) & (test.stress_Pa <= high)) < 0.95
+        assert np.mean((test.stress_Pa >= low) & (test.stress_Pa <= high)) > 0.85
     assert noise[1] == pytest.approx(noise[0], rel=0.2)
 
 
@@ -86,3 +86,23 @@ def test_rows_that_differ_by_noise_alone_all_count() -> None:
     for rows in (400, 2000):
         assert gather_tensile(pieces(rows, 0.0), 0.0, 2.0).rows > 0.8 * 2 * rows
     assert first_sd(pieces(2000, 0.0)) < 0.7 * first_sd(pieces(200, 0.0))
+
+
+@pytest.mark.parametrize(("count", "rows"), [(3, 40), (5, 300)])
+def test_bands_hold_the_law_of_pieces_that_differ(count: int, rows: int) -> None:
+    """Each piece is stiffer or softer by 6 % or so: readings of one piece are no independent tests of it."""
+    strain = np.linspace(0.02, 1.5, rows)
+    stress = strain[:, None] ** np.arange(1, 3) @ MODULI
+    at = np.array([0.5, 1.0, 1.4])[:, None] ** np.arange(1, 3)
+    inside = []
+    for seed in range(15):
+        rng = np.random.default_rng(seed)
+        each = [
+            (1.0 + 0.06 * rng.standard_normal()) * stress + NOISE * rng.standard_normal(rows)
+            for _ in range(count)
+        ]
+        found = moduli_of_test(rubber(Tensile(np.tile(strain, count), np.concatenate(each))))
+        assert found is not None
+        sd = np.sqrt(np.einsum("ij,jk,ik->i", at, np.array(found.covariance), at))
+        inside.append(np.abs(at @ (np.array(found.mean) - MODULI)) < 1.645 * sd)
+    assert np.mean(inside) > 0.75

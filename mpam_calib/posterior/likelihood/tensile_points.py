@@ -14,8 +14,11 @@ Array = NDArray[np.float64]
 
 TENSILE_POINTS = 400
 """Rows that are taken as they are; more are grouped, two points a group."""
-DEGREE = 12
-"""Of the polynomial whose residuals show how alike neighbouring rows are: as high as a remainder goes."""
+DEGREE, ROWS_EACH = 12, 4
+"""Of the polynomial whose residuals show how alike neighbouring rows are, as high as a remainder goes; and
+rows for each degree."""
+FEWEST = 6
+"""Readings that a test is worth at least, however alike its rows are."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +48,14 @@ def gather_tensile(tensile: Tensile, low: float, high: float) -> TensilePoints:
     strain, stress = tensile.strain[inside], tensile.stress_Pa[inside]
     order = np.argsort(strain, kind="stable")
     n = len(order)
-    if n <= TENSILE_POINTS:
-        return TensilePoints(strain[order], stress[order], np.ones(n), 0.0, float(n))
     e, s = strain[order], stress[order]
+    points = TensilePoints(e, s, np.ones(n), 0.0, float(n)) if n <= TENSILE_POINTS else _grouped(e, s)
+    return _counted(points, _alike(points, strain, stress))
+
+
+def _grouped(e: Array, s: Array) -> TensilePoints:
+    """Rows (N,) in order of strain as the lines of groups of neighbours."""
+    n = len(e)
     starts = np.linspace(0, n, TENSILE_POINTS // 2 + 1).astype(np.int64)[:-1]
     size = np.diff(np.append(starts, n))
     own = np.repeat(np.arange(len(starts)), size)
@@ -61,24 +69,23 @@ def gather_tensile(tensile: Tensile, low: float, high: float) -> TensilePoints:
     e = e / np.where(spread > 0.0, spread, 1.0)[own]
     rise = mean(e * s)
     ends = np.array([-1.0, 1.0])
-    points = TensilePoints(
+    return TensilePoints(
         (middle[:, None] + ends * spread[:, None]).ravel(),
         (level[:, None] + ends * rise[:, None]).ravel(),
         np.repeat(0.5 * size, 2),
         float(np.sum((s - rise[own] * e) ** 2)),
         float(n),
     )
-    return _counted(points, _alike(points, strain, stress))
 
 
 def _counted(points: TensilePoints, alike: float) -> TensilePoints:
-    """The points where each row says as much as one in ``alike``, all of them at least what a few would.
+    """The points where each row says as much as one in ``alike``.
 
     Pieces that differ, and a way back, leave residuals that go on from row to row: more rows of the same
     pieces then tell no more of the law, though each scatters as before.
     """
-    rows = max(points.rows / alike, float(TENSILE_POINTS))
-    share = rows / points.rows
+    rows = min(max(points.rows / alike, FEWEST), points.rows)
+    share = rows / points.rows if rows else 1.0
     return TensilePoints(points.strain, points.stress, share * points.count, share * points.within, rows)
 
 
@@ -87,9 +94,11 @@ def _alike(points: TensilePoints, strain: Array, stress: Array) -> float:
 
     Geyer's initial positive sequence (1992, doi:10.1214/ss/1177011137).
     """
+    if (degree := min(DEGREE, len(strain) // ROWS_EACH)) < 1:
+        return 1.0
     centre, half = 0.5 * float(strain.max() + strain.min()), 0.5 * float(np.ptp(strain)) or 1.0
     weight = np.sqrt(points.count)
-    waves = np.polynomial.chebyshev.chebvander((points.strain - centre) / half, DEGREE)
+    waves = np.polynomial.chebyshev.chebvander((points.strain - centre) / half, degree)
     curve = np.linalg.lstsq(weight[:, None] * waves, weight * points.stress, rcond=None)[0]
     left = stress - np.polynomial.chebyshev.chebval((strain - centre) / half, curve)
     n = len(left)
