@@ -122,4 +122,7 @@ def test_the_remainder_is_what_smoothing_the_misfit_leaves_of_it(found: Search) 
     fitted = fit(problem, CAUSES, len(SIZES) - 1)
     moved = replace(problem, force=fitted.force + fitted.doubt + wave)
     assert remainder_rms(moved, fitted) == pytest.approx(np.sqrt(np.mean(wave**2)), rel=0.05)
+    # What is put down to the doubt about a cause's form is no remainder.
+    doubted = replace(fitted, doubt=fitted.doubt + wave)
+    assert remainder_rms(moved, doubted) < 0.05 * np.sqrt(np.mean(wave**2))
     assert remainder_rms(moved, replace(fitted, size=0)) == 0.0

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
+from mpam_calib.criticism import gain as gain_module
 from mpam_calib.criticism.data.problem import SIZES, Problem
-from mpam_calib.criticism.fitting.fit import fit
+from mpam_calib.criticism.fitting.fit import Fit, fit
 from mpam_calib.criticism.fitting.folds import FEWEST
 from mpam_calib.criticism.fitting.predicted import predict_rows
-from mpam_calib.criticism.gain import Z90, measure_gain
+from mpam_calib.criticism.gain import Z90, _Fold, measure_gain
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.tasks.spread import Alone
+from mpam_calib.specimen.declaration import Simulation
 
 
 @pytest.fixture(scope="module")
@@ -95,3 +100,55 @@ def test_of_what_each_level_has_of_its_own_cycles_are_left_out(
     assert gain is not None
     assert gain.held_out == "cycle"
     assert gain.rmse_before < 3.0 * problem.noise_level.total
+
+
+def made_up(same: int) -> Callable[..., _Fold]:
+    """A fold of one label l: errors of 3, 2 and 1 N, gains of 1 + l nats and twice that.
+
+    The causes named are found in the first so many folds.
+    """
+
+    def fold(
+        problem: object, tested: object, named: Fit, groups: object, part: np.ndarray, *_: object
+    ) -> _Fold:
+        (label,) = part
+        sign = np.array([1.0, -1.0, 1.0, -1.0])
+        inside = [np.arange(4) < count for count in (1, 3, 4)]
+        gained = 1.0 + label
+        return _Fold(
+            residuals=[size * sign for size in (3.0, 2.0, 1.0)],
+            inside=inside,
+            elpd=np.array([[-50.0], [-50.0 + gained], [-50.0 + 2.0 * gained]]),
+            chosen=named.effects if label < same else frozenset(["tip_shape"]),
+        )
+
+    return fold
+
+
+@pytest.mark.parametrize(
+    ("cause", "cycles", "held_out", "folds"),
+    [("dead_band", 4, "pressure", 5), ("creep", 4, "cycle", 4), ("creep", 2, "pressure", 5)],
+)
+def test_each_figure_of_the_gain_is_that_of_its_own_model(
+    cause: str, cycles: int, held_out: str, folds: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whole cycles are left out where the history is the cause, and there are enough of them."""
+    monkeypatch.setattr(gain_module, "_fold", made_up(same=2))
+    rows = np.arange(40)
+    problem: Any = SimpleNamespace(
+        blueprint=SimpleNamespace(simulation=Simulation()),
+        cycles=np.arange(cycles),
+        cycle=rows % cycles,
+        level=rows % 5,
+    )
+    named: Any = SimpleNamespace(effects=frozenset([cause]))
+    gain = measure_gain(problem, (), named)
+    assert gain is not None
+    assert (gain.held_out, gain.folds, gain.folds_same_set) == (held_out, folds, 2)
+    assert (gain.rmse_before, gain.rmse_after, gain.rmse_named) == (3.0, 2.0, 1.0)
+    assert (gain.coverage90_before, gain.coverage90_after, gain.coverage90_named) == (0.25, 0.75, 1.0)
+    # 1 + 2 + ... nats; the sd of 1 ... n is sqrt(n (n + 1) / 12), and the sum's error sqrt(n) of that.
+    assert gain.elpd_gain == pytest.approx(folds * (folds + 1) / 2)
+    assert gain.elpd_gain_se == pytest.approx(folds * np.sqrt((folds + 1) / 12.0))
+    assert gain.elpd_gain_named == pytest.approx(2.0 * gain.elpd_gain)
+    assert gain.elpd_gain_named_se == pytest.approx(2.0 * gain.elpd_gain_se)

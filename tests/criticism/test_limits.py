@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -183,3 +184,21 @@ def test_what_moves_no_reading_has_no_band(problem: Problem) -> None:
     """Without friction there is nothing that presliding could round off."""
     named = fit(problem, NOTHING, 0)
     assert set(hidden_sizes(problem, ("presliding", "length_offset"), named)) == {"length_offset"}
+
+
+def test_the_band_of_an_effect_holds_those_of_all_its_kinds_that_are_in_play(problem: Problem) -> None:
+    """A drift that settles is four nats behind the steady one; that of a cell tared anew is six."""
+    made = {
+        "force_drift": (-20.0, (-1.0, 2.0)),
+        "force_drift:settling": (-24.0, (-3.0, 1.0)),
+        "force_drift:tared": (-26.0, (-9.0, 9.0)),
+        "length_offset": (-50.0, (0.5, 0.6)),
+        "wall_pressure": None,
+    }
+
+    def spread(function: object, tasks: list[tuple[object, object, str]]) -> list[Any]:
+        return [made[kind] for *_, kind in tasks]
+
+    named = fit(problem, NOTHING, 0)
+    found = hidden_sizes(problem, ("force_drift", "length_offset", "wall_pressure"), named, spread)
+    assert found == {"force_drift": (-3.0, 2.0), "length_offset": (0.5, 0.6)}

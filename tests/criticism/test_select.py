@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -222,6 +224,34 @@ def test_what_an_effect_adds_is_not_there_twice() -> None:
         values = {getattr(m, choice) for m in models}
         assert gone not in values and getattr(plain, choice) in values
         assert len({m.model_dump_json() for m in models}) == len(models)
+
+
+def by_law(law: str, log_evidence: float) -> Any:
+    """A model of order 2, with two coordinates of its own and four of its moduli."""
+    best = SimpleNamespace(u=np.zeros(2), eta=np.zeros(4))
+    simulation = Simulation(order=2, law=law, friction="none")
+    return SimpleNamespace(simulation=simulation, best=best, log_evidence=log_evidence, error=0.1)
+
+
+def test_the_table_of_models_counts_their_parameters_and_shares_their_evidence() -> None:
+    """Odds of four to one; whose levels were not left out has no figures of that."""
+    ranked = [by_law("linear", -30.0), by_law("constant", -30.0 - np.log(4.0))]
+    table = module._table(ranked, [(0.2, -11.0, 3.0)])
+    assert list(table.columns) == module.COLUMNS
+    assert table["n_parameters"].tolist() == [6, 6]
+    assert table["probability"].tolist() == pytest.approx([0.8, 0.2])
+    figures = ["rmse_held_out_N", "elpd_held_out", "elpd_held_out_se"]
+    assert table.loc[0, figures].tolist() == [0.2, -11.0, 3.0]
+    assert table.loc[1, figures].isna().all()
+
+
+def test_levels_are_looked_at_under_the_model_that_foresees_them_best() -> None:
+    ranked = [by_law(law, -30.0) for law in ("linear", "constant", "free", "exponential")]
+    held = [(1.0, density, 1.0) for density in (-30.0, float("nan"), -10.0, -20.0)]
+    found = module._apart(ranked, held, ranked[3].simulation)
+    assert found == {"first": ranked[0], "held out": ranked[2], "declared": ranked[3]}
+    none = module._apart(ranked, [(1.0, float("nan"), 1.0)] * 4, Simulation(order=5))
+    assert none == {"first": ranked[0]}
 
 
 def test_odds_of_a_choice_sum_over_all_else() -> None:

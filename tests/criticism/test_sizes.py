@@ -10,7 +10,7 @@ from rig import sets
 
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.data.problem import Problem
-from mpam_calib.criticism.diagnose import within_declared
+from mpam_calib.criticism.diagnose import _in_lab_units, within_declared
 from mpam_calib.criticism.fitting.fit import Fit, Under, chain_for, fit
 from mpam_calib.criticism.fitting.forms import forms_of, price
 from mpam_calib.criticism.searching.searched import Search
@@ -115,7 +115,7 @@ def test_a_cause_may_have_no_size(problem: Problem) -> None:
     assert not within_declared("braid_kinematics", told, setting)
 
 
-@pytest.mark.parametrize(("sds", "within"), [(-1.9, True), (2.1, False)])
+@pytest.mark.parametrize(("sds", "within"), [(-1.9, True), (1.9, True), (2.1, False), (-2.1, False)])
 def test_a_size_is_held_against_its_declared_sd(problem: Problem, sds: float, within: bool) -> None:
     assert problem.model.setting is not None
     sd = 2e3
@@ -123,6 +123,24 @@ def test_a_size_is_held_against_its_declared_sd(problem: Problem, sds: float, wi
     told = {"P_DB_kPa": Told(sds * sd, 0.1 * sd, 0.0, 0.0)}
     assert within_declared("dead_band", told, setting) is within
     assert not within_declared("tip_shape", told, setting)
+
+
+@pytest.mark.parametrize(("degrees", "within"), [(-0.9, True), (1.1, False), (-1.1, False)])
+def test_an_angle_is_held_against_the_angle_s_own_sd(problem: Problem, degrees: float, within: bool) -> None:
+    """Of half a degree, whatever is declared of the gauge."""
+    assert problem.model.setting is not None
+    geometry = problem.model.setting.geometry.model_copy(update={"sd": GeometrySd(alpha0_deg=0.5)})
+    told = {"delta_alpha_deg": Told(float(np.radians(degrees)), 0.001, 0.0, 0.0)}
+    for gauge in (0.0, 1e6):
+        setting = replace(problem.model.setting, geometry=geometry, pressure_bias_sd=gauge)
+        assert within_declared("braid_angle", told, setting) is within
+
+
+def test_sizes_are_written_in_the_units_of_their_names() -> None:
+    angle = [float(x) for x in np.radians([0.5, 0.1, 0.3, 0.7])]
+    found = _in_lab_units({"P_DB_kPa": Told(7.5e3, 500.0, 6.7e3, 8.3e3), "delta_alpha_deg": Told(*angle)})
+    assert found["P_DB_kPa"] == pytest.approx({"mean": 7.5, "sd": 0.5, "q05": 6.7, "q95": 8.3})
+    assert found["delta_alpha_deg"] == pytest.approx({"mean": 0.5, "sd": 0.1, "q05": 0.3, "q95": 0.7})
 
 
 @pytest.mark.parametrize(

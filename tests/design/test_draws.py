@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mpam_calib.design import robust
 from mpam_calib.design.draws import MuscleDraws
+from mpam_calib.design.optimality import ActiveConstraint, Optimality
 from mpam_calib.design.robust import COLUMNS, Design, Optimiser, designs_table
 from mpam_calib.model.blueprint import Blueprint, Options
 from mpam_calib.model.model import Model, build_model
@@ -254,3 +256,25 @@ def test_packed_strands_cost_what_their_energy_takes() -> None:
     losses = [F_BEST - force for force in found.force]
     assert losses == pytest.approx([loss(thin, 100.0), loss(thick, 30.0)], rel=0.01)
     assert [x[4] for x in found.x] == [100.0, 30.0]
+
+
+def test_no_tolerance_turns_a_strand_over() -> None:
+    """An angle known to ten degrees: beyond 89° from the hoop direction none is wound."""
+    made = model(10.0)
+    muscle = MuscleDraws.prepare(made, point(made, 200), 200, 0)
+    wound = ALPHA + muscle.tolerance["alpha0_deg"][:, 0]
+    assert wound.max() > 91.0 * DEG
+    T = np.tan(np.minimum(wound, 89.0 * DEG)) ** 2
+    t = 0.7 * MM
+    by_hand_force = P * np.pi * (R**2 * (2.0 * T - 1.0) + 2.0 * R * t - t**2 - 2.0 * t * R * T)
+    assert muscle.blocked_forces(P, np.array([R, t, ALPHA])) == pytest.approx(by_hand_force, rel=1e-9)
+
+
+def test_a_bound_that_a_design_only_touches_does_not_hold_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    touched = (
+        ActiveConstraint("R at its upper bound", 2.0, "mm"),
+        ActiveConstraint("V_bl/V >= low", 0.0, "1"),
+    )
+    monkeypatch.setattr(robust, "optimality", lambda problem, x: Optimality(touched, {}, 0.0))
+    made = model()
+    assert {d.held_by for d in Optimiser(made, point(made, 5)).at(P)} == {("R at its upper bound",)}

@@ -158,3 +158,14 @@ def test_what_follows_from_kept_draws_has_no_more_of_them_than_what_it_follows_f
     for figure in ("ess_bulk", "ess_tail"):
         assert table.loc["E_1", figure] <= figures.ess_bulk[0]
     assert table.loc["E_1", "ess_bulk"] == pytest.approx(table.loc["K_f", "ess_bulk"], rel=0.05)
+
+
+def test_a_sampled_parameter_has_no_more_effective_draws_than_were_kept() -> None:
+    """Of 96,000 independent draws 400 are kept, from which its figures are."""
+    chain = ar1(0.0, 1)
+    figures = diagnose_chains(chain)
+    assert min(figures.ess_bulk[0], figures.ess_tail[0]) > 4000.0
+    kept = chain[..., 0].reshape(4, -1)[:, spread_over(1500, 16, 100)]
+    sampling = Sampling(chain, chain[..., 0], figures, [], 0.3, [0.3])
+    table = summarise([Reported("K_f", "", kept.ravel(), 1.0, True, "factor")], ("K_f",), sampling)
+    assert table.loc[0, ["ess_bulk", "ess_tail"]].tolist() == [400.0, 400.0]

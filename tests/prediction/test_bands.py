@@ -98,7 +98,7 @@ def test_curves_without_a_root_are_marked_where_they_are_more_than_a_few() -> No
     """Pushed up by a zero of the remainder's; the noise of the cell makes no difference."""
     model, draws = known()
     p = model.linear_sizes[0]
-    for share, marked in ((0.02, False), (0.2, True)):
+    for share, marked in ((0.02, False), (0.045, False), (0.055, True), (0.2, True)):
         eta = draws.eta.copy()
         eta[: int(share * DRAWS), p] = 1e4
         found = muscle_bands(model, replace(draws, eta=eta), LEVELS[2:], 0).set_index("quantity")
@@ -113,8 +113,14 @@ def test_pressures_more_than_a_hundredth_of_the_highest_outside_the_levels_are_e
         not found[found["pressure_kPa"] < 205.0].set_index("quantity").loc["free_contraction", "extrapolated"]
     )
     reach = Reach(LEVELS, np.array([0.2, 0.25, 0.3]), np.zeros(3))
-    asked = np.array([0.97e5, 0.99e5, 1.5e5, 2.01e5, 2.03e5])
-    assert reach.outside(asked).tolist() == [True, False, False, False, True]
+    asked = np.array([0.97e5, 0.985e5, 0.99e5, 1.5e5, 2.01e5, 2.015e5, 2.03e5])
+    assert reach.outside(asked).tolist() == [True, *[False] * 5, True]
+    assert reach.between(np.array([0.985e5, 1.015e5, 1.03e5, 1.485e5])).tolist() == [
+        False,
+        False,
+        True,
+        False,
+    ]
     assert reach.at(np.array([1.25e5])) == pytest.approx([0.225])
     assert reach.beyond(np.array(1.25e5), np.array([0.22, 0.25])).tolist() == [False, True]
 
@@ -139,3 +145,25 @@ def test_noise_of_a_reading_is_white_and_correlated() -> None:
     assert noise_of(replace(draws, values=values)) == pytest.approx(0.3)
     values["noise_corr_sd_N"] = np.full((DRAWS, 1), 0.4)
     assert noise_of(replace(draws, values=values)) == pytest.approx(0.5)
+
+
+def test_curves_end_at_the_first_contraction_past_the_mean_free_one() -> None:
+    """However far a few of them go on: here a fifth without end."""
+    model, draws = known()
+    eta = draws.eta.copy()
+    eta[: DRAWS // 5, model.linear_sizes[0]] = 1e4
+    found = muscle_bands(model, replace(draws, eta=eta), LEVELS[2:], 0)
+    free = found.loc[found["quantity"] == "free_contraction"].iloc[0]
+    last = found.loc[found["quantity"] == "force_N", "contraction"].max()
+    assert last - 0.005 < free["mean"] <= last < free["q95"]
+
+
+def test_noise_that_grows_with_the_force_is_that_of_the_blocked_force_at_full_length() -> None:
+    model, draws = known()
+    assert model.setting is not None
+    draws = replace(draws, values=draws.values | {"noise_growth": np.full((DRAWS, 1), 2.0)})
+    found = muscle_bands(model, draws, LEVELS[2:], 3).set_index("quantity")
+    seen, bare = (found.loc[f"blocked_force_N{suffix}"] for suffix in ("_observed", ""))
+    expected = NOISE * np.sqrt(1.0 + (2.0 * bare["mean"] / model.setting.force_scale) ** 2)
+    assert expected > 1.5 * NOISE
+    assert (seen["q95"] - seen["q05"]) / 3.29 == pytest.approx(expected, rel=0.07)

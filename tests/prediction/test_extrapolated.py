@@ -66,3 +66,12 @@ def test_free_contractions_say_nothing_of_the_force_before_them() -> None:
     bands = marked(made)
     assert bands.loc["blocked_force_N", "extrapolated"]
     assert 0.27 <= contractions(bands).min() <= contractions(bands).max() <= 0.31
+
+
+def test_a_free_contraction_further_than_the_loops_went_is_marked_until_it_was_read() -> None:
+    """Without forces of its own the muscle goes on to 0.45; the loops end at 0.2, the others at 0.44."""
+    made = muscle(0.0)
+    found = marked(made).loc["free_contraction"]
+    assert 0.4 < found["mean"] < 0.5 and found["extrapolated"]
+    read = FreeContraction(**{**FREE, "contraction": np.array([0.4, 0.42, 0.46])})
+    assert not marked(replace(made, free_contraction=read)).loc["free_contraction", "extrapolated"]

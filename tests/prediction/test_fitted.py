@@ -5,9 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from model import build
 
 from mpam_calib.calibration import calibrate
-from mpam_calib.prediction.fitted import _taken_up
+from mpam_calib.model.blueprint import draw_blueprint
+from mpam_calib.model.model import build_model
+from mpam_calib.posterior.density.target import predict_force
+from mpam_calib.posterior.draws import Draws
+from mpam_calib.prediction.bands import stress_draws
+from mpam_calib.prediction.fitted import _taken_up, fitted_force, fitted_stress
 from mpam_calib.run.view import view_of
 from mpam_calib.specimen import read
 
@@ -34,3 +40,33 @@ def test_the_miss_of_a_rubbers_law_is_that_of_its_least_squares_fit():
     plain = float(np.sqrt(np.mean((data.stress - fitted) ** 2)))
     # 1,733 Pa in both ways; the amplitude of the remainder, with what the moduli share, is four times that.
     assert abs(view.remainder / plain - 1.0) < 0.05
+
+
+def test_the_simulation_and_what_it_leaves_make_up_the_whole_force():
+    """Of draws that are all one: what the simulation took of the remainder is not left, too."""
+    made = build.with_force(build.specimen(None, build.loops()), np.full(72, 10.0))
+    model = build_model(draw_blueprint(made))
+    assert model.chain is not None
+    eta = np.tile(np.random.default_rng(3).standard_normal(sum(model.linear_sizes)), (4, 1))
+    u = np.zeros((4, len(model.names)))
+    draws = Draws(u, model.values(u), eta, 1)
+    readings = build.rows_of(made.loops)
+    whole = predict_force(model, draws.values, eta, readings)[0]
+    bare = model.chain.force(draws.values, eta[:, : model.linear_sizes[0]], readings)[0]
+    fitted, square = fitted_force(model, draws, readings)
+    np.testing.assert_allclose(square, (whole - fitted) ** 2, atol=1e-9)
+    assert square.mean() < 0.9 * np.mean((whole - bare) ** 2)
+
+
+def test_so_do_a_rubbers_law_and_what_it_leaves():
+    specimen = read(ROOT / "datasets" / "ecoflex_tension")
+    model = build_model(draw_blueprint(specimen))
+    eta = np.tile(np.random.default_rng(3).standard_normal(sum(model.linear_sizes)), (4, 1))
+    u = np.zeros((4, len(model.names)))
+    draws = Draws(u, model.values(u), eta, 1)
+    assert model.tensile is not None
+    strain = np.linspace(model.tensile.low, model.tensile.high, 50)
+    whole, law = (stress_draws(model, draws, strain, remainder=r)[0] for r in (True, False))
+    stress, square = fitted_stress(model, draws, strain)
+    np.testing.assert_allclose(square, (whole - stress) ** 2, rtol=1e-6, atol=1e-6)
+    assert square.mean() < 0.9 * np.mean((whole - law) ** 2)

@@ -12,6 +12,8 @@ from rig.muscle import static_force
 from mpam_calib.calibration import Calibration, calibrate
 from mpam_calib.model.blueprint import Options
 from mpam_calib.posterior.density.target import predict_force
+from mpam_calib.posterior.draws import Draws
+from mpam_calib.prediction import left_out
 from mpam_calib.prediction.fitted import noise_of
 from mpam_calib.prediction.left_out import (
     COLUMNS,
@@ -148,3 +150,13 @@ def test_nothing_to_leave_out(sound):
     two = replace(specimen, levels_Pa=specimen.levels_Pa[:2])
     for other in (free, two):
         assert levels_left_out(other, sound.target, sound.draws, 0).empty
+
+
+def test_draws_are_reweighted_by_what_the_level_added(sound, monkeypatch: pytest.MonkeyPatch):
+    """A level whose log likelihood is −0.4 u has pulled standard normal draws down: they go back by 0.4."""
+    u = np.random.default_rng(5).standard_normal((20_000, 1))
+    draws = Draws(u, {}, np.zeros((len(u), 0)), 1)
+    monkeypatch.setattr(left_out, "_likelihood", lambda target, some: 7.0 + 0.4 * some.u[:, 0])
+    found = left_out._reweighted(sound.target, draws, np.full(len(u), 7.0), np.random.default_rng(0))
+    assert found is not None and np.isin(found, u).all()
+    assert found.mean() == pytest.approx(0.4, abs=0.03) and found.std() == pytest.approx(1.0, abs=0.03)

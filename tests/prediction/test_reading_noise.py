@@ -58,6 +58,12 @@ def test_it_grows_with_the_force() -> None:
     assert draws(made).std(axis=0) == pytest.approx([0.3, 0.3 * np.sqrt(5.0)], rel=0.02)
 
 
+def test_heavy_tails_grow_with_the_force_as_well() -> None:
+    found = draws(noise(noise_sd_N=0.3, noise_growth=1.0, noise_dof=3.0))
+    for column, scale in enumerate((0.3, 0.3 * np.sqrt(5.0))):
+        assert stats.kstest(found[:, column] / scale, stats.t(3.0).cdf).pvalue > 1e-3
+
+
 def test_heavy_tails() -> None:
     found = draws(noise(noise_sd_N=0.3, noise_dof=3.0))[:, 0]
     assert stats.kstest(found / 0.3, stats.t(3.0).cdf).pvalue > 1e-3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,22 +21,24 @@ BREAK, SOFT, STIFF, NOISE = 0.5, 4e4, 9e4, 50.0
 """A rubber that is stiffer beyond a strain of 0.5 (Pa)."""
 
 
-def rubber(folder: Path, high: float) -> tuple[Specimen, Model]:
-    stress = SOFT * STRAIN + (STIFF - SOFT) * np.maximum(STRAIN - BREAK, 0.0)
-    stress += NOISE * np.random.default_rng(0).standard_normal(len(STRAIN))
-    rows = "".join(f"{e:.4f},{s:.2f}\n" for e, s in zip(STRAIN, stress, strict=True))
+def rubber(
+    folder: Path, high: float, low: float = 0.0, strain: np.ndarray = STRAIN
+) -> tuple[Specimen, Model]:
+    stress = SOFT * strain + (STIFF - SOFT) * np.maximum(strain - BREAK, 0.0)
+    stress += NOISE * np.random.default_rng(0).standard_normal(len(strain))
+    rows = "".join(f"{e:.4f},{s:.2f}\n" for e, s in zip(strain, stress, strict=True))
     (folder / "tensile.csv").write_text(f"strain,stress_Pa\n{rows}")
     (folder / "specimen.toml").write_text(
         '[specimen]\nname = "rubber"\n[files]\ntensile = "tensile.csv"\n[simulation]\norder = 1\n'
-        f"[fit]\ntensile_strain = [0.0, {high}]\n"
+        f"[fit]\ntensile_strain = [{low}, {high}]\n"
     )
     specimen = read(folder)
     return specimen, build_model(draw_blueprint(specimen))
 
 
-def table(folder: Path, high: float) -> tuple[pd.DataFrame, np.ndarray]:
+def table(folder: Path, high: float, *test: Any) -> tuple[pd.DataFrame, np.ndarray]:
     """The table, and the modulus (Pa) of the draws that it is given."""
-    specimen, model = rubber(folder, high)
+    specimen, model = rubber(folder, high, *test)
     count, (p, q, r) = 400, model.linear_sizes
     u = np.zeros((count, len(model.names)))
     eta = np.random.default_rng(1).standard_normal((count, p + q + r))
@@ -57,6 +60,15 @@ def test_each_range_has_the_modulus_of_its_own_readings(tmp_path: Path) -> None:
     assert moduli.loc[1:2, "mean"].tolist() == pytest.approx([SOFT, SOFT], rel=0.02)
     assert (moduli.loc[1:2, "q05"] < SOFT).all() and (moduli.loc[1:2, "q95"] > SOFT).all()
     assert 1.2 * SOFT < moduli.loc[3, "mean"] < STIFF
+
+
+def test_halves_and_quarters_begin_where_the_range_does_and_the_whole_test_at_no_strain(
+    tmp_path: Path,
+) -> None:
+    """A test piece that hung loose at first has strains below 0, which no bladder has."""
+    found, _ = table(tmp_path, 1.0, 0.2, np.linspace(-0.1, 2.0, 211))
+    ranges = found.loc[found["quantity"] == "E_1", ["strain_low", "strain_high"]].to_numpy()
+    assert ranges == pytest.approx(np.array([[0.2, 1.0], [0.2, 0.6], [0.2, 0.4], [0.0, 2.0]]))
 
 
 def test_a_range_of_few_readings_is_left_out(tmp_path: Path) -> None:

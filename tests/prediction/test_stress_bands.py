@@ -16,9 +16,9 @@ from mpam_calib.specimen import read
 STRAIN = np.linspace(0.0, 1.0, 41)
 
 
-def bands(folder: Path, declared: str) -> tuple[np.ndarray, np.ndarray]:
-    """Strains and marks of a test up to a strain of one."""
-    rows = "".join(f"{e:.4f},{4e4 * e:.1f}\n" for e in STRAIN)
+def bands(folder: Path, declared: str, tested: np.ndarray = STRAIN) -> tuple[np.ndarray, np.ndarray]:
+    """Strains and marks of a test, up to a strain of one."""
+    rows = "".join(f"{e:.4f},{4e4 * e:.1f}\n" for e in tested)
     (folder / "tensile.csv").write_text(f"strain,stress_Pa\n{rows}")
     (folder / "specimen.toml").write_text(
         '[specimen]\nname = "rubber"\n[files]\ntensile = "tensile.csv"\n[simulation]\norder = 2\n' + declared
@@ -38,3 +38,9 @@ def test_strains_beyond_the_test_are_extrapolated(tmp_path: Path) -> None:
 
 def test_strains_inside_the_test_are_not(tmp_path: Path) -> None:
     assert not bands(tmp_path, "[fit]\ntensile_strain = [0.1, 0.6]\n")[1].any()
+
+
+def test_nor_are_only_those_beyond_it_but_those_before_it(tmp_path: Path) -> None:
+    """The clamps had stretched it by three tenths before the first reading."""
+    strain, marked = bands(tmp_path, "[fit]\ntensile_strain = [0.0, 1.0]\n", STRAIN[STRAIN >= 0.3])
+    assert np.array_equal(marked, strain < 0.3 - 1e-6) and marked.any()

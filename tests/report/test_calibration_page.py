@@ -11,9 +11,10 @@ import pandas as pd
 import pytest
 
 from mpam_calib.prediction.left_out import COLUMNS
-from mpam_calib.report.calibration import calibration_page
+from mpam_calib.report.calibration import _left_out_section, _pairs_section, calibration_page
 from mpam_calib.report.figures import corner, density, residuals
 from mpam_calib.report.numbers import with_band
+from mpam_calib.report.page import DataTable, Text
 from mpam_calib.report.parameters import learnt_table, summary_table
 from mpam_calib.report.view import CalibrationView
 from mpam_calib.specimen.declaration import Simulation
@@ -278,3 +279,25 @@ def test_binned_means() -> None:
     mean_x, mean_y = residuals.binned(x, np.array([1.0, 3.0, 5.0, 7.0]), bins=2)
     np.testing.assert_allclose(mean_x, [0.05, 0.95])
     np.testing.assert_allclose(mean_y, [2.0, 6.0])
+
+
+def test_each_figure_of_a_level_left_out_stands_in_its_column(view: CalibrationView) -> None:
+    """A bias below zero is one: the readings lie below what the others foresee."""
+    rows = [(50.0, 40, 2.5, 1.9, 0.7, 0.4, True), (150.0, 40, 1.234, -0.56, 0.21, 0.85, False)]
+    section = _left_out_section(replace(view, left_out=pd.DataFrame(rows, columns=COLUMNS)))
+    (table,) = section.blocks
+    assert isinstance(table, DataTable)
+    first, second = table.frame.to_numpy().tolist()
+    assert first == ["50 (beyond the others)", "40 %", "2.5", "1.9 ± 0.7"]
+    assert second == ["150", "85 %", "1.2", "−0.56 ± 0.2"]
+
+
+def test_parameters_that_go_against_each_other_are_linked_as_strongly() -> None:
+    plain = muscle(n_draws=300)
+    made = replace(
+        plain,
+        headline=("K_f", "tip_factor"),
+        draws={"K_f": plain.draws["K_f"], "tip_factor": -plain.draws["K_f"]},
+    )
+    text = next(block for block in _pairs_section(made).blocks if isinstance(block, Text))
+    assert "K_f and tip_factor (−1.00)" in text.html

@@ -10,6 +10,7 @@ from mpam_calib.design.robust import Design, Packed, designs_table
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.report.design_bounds import beyond_bounds
 from mpam_calib.report.designs import DesignsView, designs_page
+from mpam_calib.report.designs_table import contraction_band
 from mpam_calib.report.page import DataTable, Headline, Notice, Numbers, Page
 from mpam_calib.specimen.declaration import Geometry, Sensors, Simulation
 
@@ -116,3 +117,11 @@ def test_what_holds_a_design_stands_at_its_value() -> None:
 
 def test_what_nineteen_in_twenty_exceed_is_not_rounded_up() -> None:
     assert cards(page(THESIS))["Nineteen in twenty exceed"] == "72.9"  # of 72.98
+
+
+def test_a_free_contraction_has_an_upper_end_where_all_but_a_few_draws_have_a_root() -> None:
+    """In per cent; those without count with where the curves end, 60 %."""
+    draws = np.linspace(0.30, 0.32, 101)
+    assert contraction_band(draws) == ("31.0", "30.1–31.9")
+    value, band = contraction_band(np.where(np.arange(101) < 91, draws, 0.6))
+    assert value.startswith("at least ") and band == "30 to beyond 60"

@@ -39,6 +39,17 @@ def test_slack_where_the_fit_pulls(sound: CalibrationView, kind: str) -> None:
     assert "up to 35 N" in limit.sentence
 
 
+@pytest.mark.parametrize(("kind", "said"), [("force_map", "at 100 kPa"), ("blocked_force", "at 88 kPa")])
+def test_slack_is_found_by_its_level_or_where_there_is_none_by_its_pressure(
+    sound: CalibrationView, kind: str, said: str
+) -> None:
+    view = with_slack(sound, 35.0, kind)
+    observed = view.observed.copy()
+    observed.loc[observed["censored"].astype(bool), "pressure_kPa"] = 88.0
+    limit = doubts.overruled_slack(replace(view, observed=observed))
+    assert limit is not None and limit.brief == f"1 slack reading, {said}, is not believed"
+
+
 @pytest.mark.parametrize(
     ("pull", "floor"),
     # past the free contraction, just before it, a floor that high, and where nothing is foreseen

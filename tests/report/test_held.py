@@ -59,6 +59,18 @@ def test_readings_past_the_band_say_nothing(sound: CalibrationView) -> None:
     last = sound.observed[sound.observed["kind"] == "loops"].assign(contraction=0.5, force_N=-50.0)
     view = replace(sound, observed=pd.concat([sound.observed, last]))
     assert held.held_along(view) == held.held_along(sound)
+    # At 50 kPa it ends at 0.192 already, whatever the others do.
+    low = last[last["level_kPa"] == 50.0].assign(contraction=0.25)
+    view = replace(sound, observed=pd.concat([sound.observed, low]))
+    assert held.held_along(view) == held.held_along(sound)
+
+
+def test_slack_readings_lie_in_no_band(sound: CalibrationView) -> None:
+    """They read the floor, wherever the muscle would pull."""
+    slack = sound.observed[sound.observed["kind"] == "loops"].assign(force_N=-50.0, censored=True)
+    view = replace(sound, observed=pd.concat([sound.observed, slack]))
+    assert held.held_along(view) == held.held_along(sound)
+    assert held.held_near(view) == held.held_near(sound)
 
 
 @pytest.mark.parametrize(("sds", "told"), [(0.0, True), (3.0, False)])

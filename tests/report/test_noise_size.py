@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from model import build
 from prediction.coverage import as_specimen, rig_case
@@ -159,3 +160,13 @@ def test_slow_noise_is_ordinary_and_strokes_of_mixed_levels_are_not() -> None:
 
     limit = found_in(mixed)
     assert limit is not None and "went into the noise" in limit.brief
+
+
+@pytest.mark.parametrize("kind", ["loops", "force_map", "blocked_force"])
+def test_the_largest_pull_is_that_of_whatever_was_recorded(sound: CalibrationView, kind: str) -> None:
+    """But for slack readings, and for one wild one in a thousand."""
+    force = np.append(np.linspace(-5.0, 80.0, 999), 1e4)
+    row = {"kind": kind, "force_N": force, "censored": False}
+    slack = pd.DataFrame({"kind": kind, "force_N": np.full(500, 99.0), "censored": True})
+    view = replace(sound, observed=pd.concat([pd.DataFrame(row), slack]))
+    assert noise_size.top_force(view) == pytest.approx(79.2, abs=0.2)

@@ -68,6 +68,16 @@ def test_how_far_the_readings_go_is_said_where_more_than_a_tenth_is_unseen(
     assert ("nothing is extrapolated by more than 10 %" in assess(view).reasons[-1]) != bool(told)
 
 
+def test_readings_of_other_levels_do_not_stand_in_for_the_top_one_s(sound: CalibrationView) -> None:
+    """Those at 200 kPa go almost as far as the free contraction at 250."""
+    ended = cut(sound, 0.75).observed
+    others = sound.observed[sound.observed["level_kPa"] < 250.0]
+    view = replace(sound, observed=pd.concat([ended[ended["level_kPa"] == 250.0], others]))
+    limit = reach.extrapolation(flagged(view, "free_contraction", 250.0))
+    assert limit is not None
+    assert limit.sentence.startswith("The readings go to 75 % of the free contraction at 250 kPa")
+
+
 def test_a_pressure_beyond_the_readings(sound: CalibrationView) -> None:
     limit = reach.extrapolation(flagged(sound, "blocked_force_N", 250.0))
     assert limit is not None and limit.brief == "the blocked force is extrapolated"

@@ -169,6 +169,26 @@ def test_a_gauge_that_makes_up_the_band_is_named(sound: CalibrationView) -> None
     assert limit is not None and "sets the width" in limit.sentence
 
 
+@pytest.mark.parametrize(
+    ("sd", "levels", "told"),
+    [
+        (1.5, 5, ""),
+        (2.0, 5, "sets the width of the band"),
+        (6.0, 5, "sets the width of the band"),
+        (7.5, 5, "the bands hold for pressures as this gauge reads them"),
+        (6.0, 4, "the bands hold for pressures as this gauge reads them"),
+    ],
+)
+def test_a_gauge_is_held_against_the_band_at_the_highest_level(
+    sound: CalibrationView, sd: float, levels: int, told: str
+) -> None:
+    """0.39 N/kPa beside sds of 1.3 N at 250 kPa and 1.1 N at 200: 30 and 35 % of the band for each kPa."""
+    view = replace(sound, pressure_bias_sd_kPa=sd, levels_kPa=sound.levels_kPa[:levels])
+    limit = trust.gauge(view)
+    assert (limit is not None) == bool(told)
+    assert limit is None or told in limit.brief
+
+
 def test_what_the_data_do_not_tell_is_named_in_words(sound: CalibrationView) -> None:
     said = replace(sound, meanings={"P_DB_kPa": "pressure that does no work yet"})
     limit = trust.identification(said)
@@ -183,6 +203,13 @@ def test_what_the_data_do_not_tell_is_named_in_words(sound: CalibrationView) -> 
     count = len(sound.unidentified)
     assert limit is not None and limit.brief.endswith(f" and {count - 2} more")
     assert f" and {count - 5} more alone: the data say nothing about them" in limit.sentence
+
+
+def test_parameters_that_learnt_less_than_a_fifth_are_named_the_worst_first(sound: CalibrationView) -> None:
+    frame = sound.unidentified.assign(contraction=0.9)
+    frame.loc[frame.index[:4], "contraction"] = [0.19, 0.1, 0.21, 0.45]
+    expected = [frame["parameter"].iloc[1], frame["parameter"].iloc[0]]
+    assert trust.unidentified_names(replace(sound, unidentified=frame)) == expected
 
 
 def test_reconstructed_data_are_a_caution(sound: CalibrationView) -> None:

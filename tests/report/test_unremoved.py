@@ -62,6 +62,11 @@ def test_a_fault_is_told_with_its_size_and_what_may_cause_it(fault: str, said: s
     assert said in text
 
 
+def test_saturated_readings_are_told_in_per_cent() -> None:
+    (text,) = unremoved(FAULTLESS | {"saturated_share": 0.0234})
+    assert "2.34 % of the readings lie at one extreme force" in text
+
+
 def test_what_the_residuals_depend_on_is_told_beside_a_remainder() -> None:
     trace = {"trace": {"against": "branch", "rms_N": 0.0456}}
     (text,) = unremoved(FAULTLESS | trace)

@@ -10,13 +10,19 @@ import pytest
 from model import build
 
 from mpam_calib.calibration import Calibration, calibrate
+from mpam_calib.model.noise import WHITE
+from mpam_calib.model.readings import Readings
+from mpam_calib.model.remainder import ROUGH
 from mpam_calib.prediction.fitted import fitted_force
-from mpam_calib.run.observed import DRAWS, observed_readings
+from mpam_calib.prediction.reading_noise import ReadingNoise
+from mpam_calib.run.observed import DRAWS, _bins_frame, _frame, _noise_of_means, observed_readings
 from mpam_calib.run.view import view_of
+from mpam_calib.specimen.declaration import Sensors
 from mpam_calib.specimen.oddities import stroke_stray
+from mpam_calib.specimen.recording import ForceMap, FreeContraction
 from mpam_calib.units import KPA
 
-from .small import K_F, L0, static_force
+from .small import K_F, L0, free_contraction, static_force
 
 NOISE_N = 0.1
 
@@ -80,3 +86,49 @@ def test_the_page_has_the_run_s_own_demands_and_ends(calibration: Calibration) -
     np.testing.assert_allclose(view.strays_kPa, strays)
     grid = bands.loc[bands["quantity"] == "force_N", "contraction"]
     assert grid.max() <= view.curves_end < 0.6
+
+
+def test_the_noise_of_a_mean_counts_the_rows_that_were_averaged_on_reading(calibration: Calibration) -> None:
+    """Two rows in a bin, each the mean of 25 of the rig's: a tenth of sqrt(2) of one reading's noise."""
+    bins = calibration.target.data.bins
+    assert bins is not None and bins.count.max() == 2.0
+    one = ReadingNoise({WHITE: np.full((1, 1), 0.7)}, 1.0)
+    found = _noise_of_means(one, replace(bins, averaged=25), slice(0, 3))
+    np.testing.assert_allclose(found.sd(np.zeros((1, 3))), 0.7 / np.sqrt(50.0))
+
+
+def test_what_the_simulation_misses_holds_each_stroke_s_own_part(calibration: Calibration) -> None:
+    bins, draws = calibration.target.data.bins, calibration.draws.thin(50)
+    assert bins is not None
+    rough = replace(draws, values=draws.values | {ROUGH: np.full((len(draws), 1), 0.3)})
+    left, plain = (_bins_frame(bins, calibration, some)[1] for some in (rough, draws))
+    np.testing.assert_allclose(left - plain, 0.3**2)
+
+
+def test_a_static_reading_is_shown_with_the_level_it_is_nearest_to(calibration: Calibration) -> None:
+    places = Readings.at_rest(np.array([104e3, 121e3, 131e3, 260e3]), np.zeros(4))
+    frame = _frame("blocked_force", places, np.zeros(4), np.zeros(4, dtype=bool), calibration)
+    levels = calibration.specimen.levels_Pa / KPA
+    np.testing.assert_allclose(frame["level_kPa"], levels[[0, 0, 1, 2]], atol=1e-3)
+    np.testing.assert_allclose(frame["pressure_kPa"], [104.0, 121.0, 131.0, 260.0])
+
+
+def test_a_free_contraction_is_shown_beside_that_of_the_fit() -> None:
+    """A map tells the curve; the free contractions were all read 0.01 too far."""
+    pressure, grid = np.repeat([1e5, 1.5e5, 2e5], 30), np.tile(np.linspace(0.0, 0.26, 30), 3)
+    force = static_force(pressure / KPA, grid) + NOISE_N * np.random.default_rng(4).standard_normal(90)
+    still = np.zeros(90, dtype=np.int64)
+    force_map = ForceMap(pressure, grid, force, np.repeat(np.arange(3), 30), still, still > 0)
+    true = np.array([free_contraction(level) for level in (100.0, 150.0, 200.0)])
+    made = build.specimen(
+        {"order": 2, "law": "linear", "friction": "none"},
+        levels_kPa=(100.0, 150.0, 200.0),
+        force_map=force_map,
+        free_contraction=FreeContraction(np.array([1e5, 1.5e5, 2e5]), true + 0.01),
+        sensors=Sensors(force_sd_N=NOISE_N),
+    )
+    found = calibrate(made, max_steps=60, ess_wanted=150.0, options=build.PLAIN)
+    rows = observed_readings(found)[0]
+    free = rows[rows["kind"] == "free_contraction"]
+    np.testing.assert_allclose(free["contraction"], true + 0.01)
+    np.testing.assert_allclose(free["fitted_N"], true, atol=0.004)

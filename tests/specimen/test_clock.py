@@ -75,3 +75,12 @@ def test_a_single_repeat_and_a_step_back_are_refused(tmp_path: Path) -> None:
         row = 42 if words == "again" else len(time) + 1
         with pytest.raises(InputError, match=rf"loops\.csv:{row}:time_s: .*{words}"):
             read(folder)
+
+
+def test_the_last_tick_is_as_long_as_the_one_before_it(tmp_path: Path) -> None:
+    made = recording()
+    whole = len(made.time) // 5 * 5
+    made = Recording(*(column[:whole] for column in vars(made).values()))
+    found = read(make(tmp_path, loops=on_ticks(made).text())).loops
+    assert found is not None
+    assert np.diff(found.time_s)[-4:] == pytest.approx(np.full(4, EVERY))

@@ -161,3 +161,12 @@ def test_a_force_that_stands_still_while_the_muscle_moves(
         assert ("did the load cell or its logger hang?" in found) == said
         if said:
             assert f"loops: the force stands at {sound[30]:.5g} N for 40 readings from 3 s" in found
+
+
+@pytest.mark.parametrize(("lowest", "said"), [(120.0, False), (80.0, True)])
+def test_levels_within_a_factor_of_two_may_well_end_at_one_force(
+    lowest: float, said: bool, tmp_path: Path
+) -> None:
+    made = to_free_contraction((lowest, 150.0, 200.0))
+    found = remarks(tmp_path, made, noisy(made.force + 10.0))
+    assert ("at each of 3 levels; was the load cell zeroed" in found) == said

@@ -315,3 +315,30 @@ def test_rows_longer_than_the_straight_strands_are_counted(tmp_path: Path) -> No
         oddities(read(make(tmp_path, text, force_map="pressure_kPa,contraction,force_N\n" + rows)))
     )
     assert "force_map: 2 rows are longer than the straight strands (contraction -0.051)" in found
+
+
+@pytest.mark.parametrize(("factor", "said"), [(0.25, True), (0.5, False), (2.0, False), (4.0, True)])
+def test_forces_beyond_three_times_the_gas_s_pull_or_a_third_are_asked_about(
+    factor: float, said: bool, tmp_path: Path
+) -> None:
+    """The gas at 150 kPa and full length: pi R0^2 P (2 tan^2 72° - 1) = 76.1 N."""
+    header, *body = loops().text().splitlines()
+    rows = [line.split(",") for line in body]
+    top = np.quantile([float(row[3]) for row in rows], 0.99)
+    gas = np.pi * 0.003**2 * 150e3 * (2.0 * np.tan(np.radians(72.0)) ** 2 - 1.0)
+    times(3, factor * gas / top)(rows)
+    found = " ".join(oddities(read(make(tmp_path, loops="\n".join([header, *map(",".join, rows)]) + "\n"))))
+    assert (f"while the gas alone pulls about {gas:.3g} N" in found) == said
+
+
+def test_a_crosshead_s_speed_is_told_in_millimetres_a_minute(tmp_path: Path) -> None:
+    """0.8 mm/s a thousand times too fast: 48 m/min."""
+    told = re.search(r"the crosshead moves at (\S+) mm/min", remarks(tmp_path, times(0, 1e-3)))
+    assert told is not None and float(told[1]) == pytest.approx(48e3, rel=0.03)
+
+
+@pytest.mark.parametrize(("sd", "said"), [(149.0, False), (151.0, True)])
+def test_a_gauge_is_held_against_the_highest_level(sd: float, said: bool, tmp_path: Path) -> None:
+    text = DECLARATION.replace("[files]", f"[sensors]\npressure_bias_sd_kPa = {sd}\n\n[files]")
+    found = " ".join(oddities(read(make(tmp_path, text, loops=loops().text()))))
+    assert (f"pressure_bias_sd_kPa = {sd:g} is above the highest level, 150 kPa" in found) == said

@@ -12,7 +12,7 @@ from mpam_calib.specimen import Specimen, read
 from mpam_calib.specimen.loops import one_after_the_other
 from mpam_calib.specimen.recording import Loops
 
-from .folders import DECLARATION, Recording, loops, make
+from .folders import DECLARATION, HEADER, Recording, loops, make
 
 
 def loops_of(specimen: Specimen) -> Loops:
@@ -196,6 +196,21 @@ def test_floor_and_censored_column(tmp_path: Path) -> None:
     specimen = read(make(tmp_path, declaration, loops=loops().text()))
     found = loops_of(specimen)
     assert found.censored.any() and (found.censored == (found.force_N <= 12.0)).all()
+
+
+def test_a_reading_at_the_floor_itself_is_slack(tmp_path: Path) -> None:
+    """As the load cell writes it; so it is in a file of blocked forces."""
+    declaration = DECLARATION.replace("[files]", "[sensors]\nforce_floor_N = 12.0\n\n[files]")
+    declaration = declaration.replace('"loops.csv"', '"loops.csv"\nblocked_force = "blocked_force.csv"')
+    columns = loops().columns()
+    columns[:, 3] = np.maximum(columns[:, 3], 12.0)
+    rows = "\n".join(",".join(f"{value:.5f}" for value in row) for row in columns)
+    blocked = "pressure_kPa,force_N\n10,12\n20,12.01\n30,11.9\n"
+    specimen = read(make(tmp_path, declaration, loops=f"{HEADER}\n{rows}\n", blocked_force=blocked))
+    found = loops_of(specimen)
+    assert found.censored.any() and (found.censored == (found.force_N == 12.0)).all()
+    assert specimen.blocked_force is not None
+    assert specimen.blocked_force.censored.tolist() == [True, False, True]
 
 
 STATIC = """

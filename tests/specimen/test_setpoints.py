@@ -9,6 +9,7 @@ import pytest
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen import Specimen, read
+from mpam_calib.specimen.levels import same_level
 
 from .folders import HEADER, Recording, loops, make
 
@@ -94,3 +95,21 @@ def test_one_level_is_named_where_the_law_needs_more(
     header += ",setpoint_kPa" * bool(setpoint)
     with pytest.raises(InputError, match=said):
         read(make(tmp_path, loops="\n".join([header, *map(",".join, rows)]) + "\n"))
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.15, False), (0.25, True), (-0.25, True)])
+def test_a_setpoint_far_from_its_readings_is_told(share: float, told: bool, tmp_path: Path) -> None:
+    """By more than a fifth of what was set."""
+    recording = loops((50.0, 100.0, 150.0), rate=20.0)
+    specimen = with_setpoints(tmp_path, recording, recording.pressure / (1.0 - share))
+    notes = [note for note in specimen.notes if "it only groups the rows" in note]
+    assert len(notes) == told
+    if told:
+        said = f"setpoint_kPa is {150.0 / (1.0 - share):.4g} where pressure_kPa reads 150;"
+        assert said in notes[0]
+
+
+def test_levels_of_two_files_are_one_within_a_kilopascal_or_two_hundredths() -> None:
+    level = 1e3 * np.array([20.0, 20.0, 200.0, 200.0])
+    reading = 1e3 * np.array([20.9, 21.1, 196.1, 195.9])
+    assert same_level(reading, level).tolist() == [True, False, True, False]

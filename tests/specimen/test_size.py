@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from mpam_calib.errors import InputError
@@ -80,6 +81,8 @@ def test_averages_keep_strokes_levels_and_means(tmp_path: Path) -> None:
     assert specimen.levels_Pa / 1e3 == pytest.approx([50.0, 150.0], abs=0.2)
     assert found.stroke[-1] + 1 == 12
     assert set(found.cycle) == {1, 2, 3}
+    told = summarise_loops(found, specimen.levels_Pa, 0.05).levels
+    assert sum(level.rows for level in told) == pytest.approx(len(recording.time), rel=0.2)
     # No average mixes two levels or two branches: the force law of each holds for the means.
     sign = np.where(found.branch == 1, 1.0, -1.0)
     law = 0.3 * found.pressure_Pa / 1e3 * (1.0 - found.displacement_m * 1e3 / 20.0) * (1.0 + 0.05 * sign)
@@ -151,3 +154,17 @@ def test_rows_that_were_not_averaged_are_not_said_to_be(tmp_path: Path) -> None:
     found = specimen.loops
     assert found is not None
     assert len(found.time_s) * found.averaged == pytest.approx(len(cycle), rel=0.2)
+
+
+@pytest.mark.parametrize(("slack", "said"), [(0, False), (2, False), (3, True), (5, True)])
+def test_a_mean_is_slack_where_at_least_half_of_its_rows_are(slack: int, said: bool) -> None:
+    """Sixty rows on one stroke, six to a mean, whose number in the file is its first row's."""
+    time = np.arange(60.0)
+    frame = pd.DataFrame(
+        {"time_s": time, "pressure_kPa": 100.0, "displacement_mm": 0.1 * time, "force_N": 90.0 - time},
+        index=np.arange(60) + 2,
+    )
+    means, censored = reduction.average_rows(frame, 6, time >= 60 - slack)
+    assert censored.tolist() == [False] * 9 + [said]
+    assert means["force_N"].tolist() == pytest.approx(87.5 - 6.0 * np.arange(10))
+    assert means.index.tolist() == list(range(2, 62, 6))

@@ -8,6 +8,7 @@ import pytest
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen import read
+from mpam_calib.specimen.units_row import worth
 
 from .folders import DECLARATION, loops, make
 
@@ -100,3 +101,23 @@ def test_units_of_what_a_map_makes_another_quantity_of(tmp_path: Path, units: st
     else:
         with pytest.raises(InputError, match=r"tensile.csv:2:strain: found \"furlong\", expected a number"):
             read(made)
+
+
+@pytest.mark.parametrize(
+    ("column", "units"),
+    [
+        ("time_s", {"s": 1.0, "ms": 1e-3, "min": 60.0}),
+        ("pressure_kPa", {"Pa": 1e-3, "hPa": 0.1, "mbar": 0.1, "bar": 100.0, "MPa": 1000.0, "psi": 6.8948}),
+        ("displacement_mm", {"µm": 1e-3, "um": 1e-3, "cm": 10.0, "m": 1000.0, "in": 25.4}),
+        (
+            "force_N",
+            {"mN": 1e-3, "kN": 1000.0, "g": 9.80665e-3, "kg": 9.80665, "kgf": 9.80665, "lbf": 4.4482},
+        ),
+        ("stress_Pa", {"kPa": 1e3, "MPa": 1e6}),
+        ("contraction", {"%": 0.01, "-": 1.0, "mm/mm": 1.0}),
+        ("strain", {"%": 0.01, "": 1.0}),
+    ],
+)
+def test_what_a_unit_is_worth(column: str, units: dict[str, float]) -> None:
+    assert {unit: worth(column, unit) for unit in units} == pytest.approx(units, rel=1e-4)
+    assert worth(column, "furlong") is None
