@@ -24,14 +24,15 @@ WHOSE = {
 def against(nats: float) -> str:
     """Odds of so many nats in words.
 
-    >>> against(0.0), against(-2.302585), against(2.302585), against(-230.2585)
-    ('1 to 1', '1 to 10', '10 to 1', '1 to 10¹⁰⁰')
+    >>> against(0.0), against(-2.302585), against(2.302585), against(-4.603), against(-230.2585)
+    ('1 to 1', '1 to 10', '10 to 1', '1 to 100', '1 to 10¹⁰⁰')
     """
     size = abs(nats)
     if size > math.log(HUGE):
         text = f"10{superscript(round(size / math.log(10.0)))}"
     else:
-        text = f"{math.exp(size):.2g}" if size < math.log(100.0) else f"{math.exp(size):.0f}"
+        odds = math.exp(size)
+        text = f"{odds:.2g}" if odds < 99.5 else f"{odds:.0f}"
     return f"1 to {text}" if nats <= 0.0 else f"{text} to 1"
 
 

@@ -217,8 +217,9 @@ def _trust(view: DesignsView) -> Verdict:
     rootless = [d for d in view.designs if d.without_root > 0.0]
     if rootless:
         worst = max(d.without_root for d in rootless)
+        share = f"up to {worst:.0%}" if worst >= 0.01 else "less than 1%"
         reasons.append(
-            f"In up to {worst:.0%} of the draws the force stays positive to {LIMIT:.0%} contraction; "
+            f"In {share} of the draws the force stays positive to {LIMIT:.0%} contraction; "
             "these count with that contraction, so that means and upper ends are too low."
         )
     if not view.converged:

@@ -104,14 +104,14 @@ def fixed(value: float, n: int) -> str:
 def significant(value: float, digits: int = 3) -> str:
     """The value with so many significant digits.
 
-    >>> significant(0.073456), significant(89588.0, 2), significant(-1.0822e8), significant(0.0)
-    ('0.0735', '90000', '−1.08×10⁸', '0')
+    >>> significant(0.073456), significant(89588.0, 2), significant(-1.0822e8), significant(9.996)
+    ('0.0735', '90000', '−1.08×10⁸', '10.0')
     """
     if not math.isfinite(value):
         return "–"
     if value == 0:
         return "0"
-    if SMALL <= abs(value) < LARGE:
-        return fixed(value, digits - 1 - math.floor(math.log10(abs(value))))
     mantissa, power = f"{value:.{digits - 1}e}".split("e")
+    if SMALL <= abs(value) < LARGE:
+        return fixed(value, digits - 1 - int(power))
     return f"{mantissa.replace('-', '−')}{ten_to(int(power))}"

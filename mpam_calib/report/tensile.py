@@ -40,9 +40,9 @@ def tensile_lead(view: CalibrationView) -> list[Block]:
     if len(first):
         row = first.iloc[0]
         value, band = with_band(*(1e-3 * float(row[q]) for q in ("mean", "q05", "q95", "q50")))
-        cards.append(
-            KeyNumber("First modulus E_1", value, "kPa", f"90 % band: {band} kPa", "slope at small strain")
-        )
+        engineering = view.simulation.strain == "engineering"
+        hint = "slope at small strain" if engineering else "a coefficient in the stretch, not a slope"
+        cards.append(KeyNumber("First modulus E_1", value, "kPa", f"90 % band: {band} kPa", hint))
     name = view.material or view.name
     sentence = Markup("Stretched, {} carries {}.").format(name, Markup(" and ").join(parts))
     return [Headline(sentence), Numbers(cards), assess(view)]

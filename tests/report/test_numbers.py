@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mpam_calib.report.numbers import with_band
+from mpam_calib.report.numbers import significant, with_band
 
 
 def test_an_absurd_mean_gives_way_to_the_median() -> None:
@@ -20,3 +20,8 @@ def test_without_a_median_the_mean_is_marked_and_the_band_stays_readable() -> No
 def test_a_mean_inside_its_band_is_not_marked() -> None:
     assert with_band(94.3214, 93.81, 94.9, 94.2) == ("94.3", "93.8–94.9")
     assert with_band(1.0, 1.0, 1.0, 1.0)[0] == "1.000"
+
+
+def test_rounding_up_to_a_power_of_ten_gives_no_further_digit() -> None:
+    assert [significant(x) for x in (99.96, 99.94, 9.996, -0.9999)] == ["100", "99.9", "10.0", "−1.00"]
+    assert significant(9.96, 2) == "10"

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
+from mpam_calib.report.blocks import Numbers
 from mpam_calib.report.figures import tensile
+from mpam_calib.report.tensile import tensile_lead
 
 from .synthetic import material
 
@@ -35,3 +37,13 @@ def test_strains_that_were_not_read_are_shaded(
     assert len(found) == len(shaded)
     assert np.allclose(found, shaded, atol=1e-6)
     assert len([t for t in ax.texts if t.get_text() == "outside the readings"]) == len(shaded)
+
+
+@pytest.mark.parametrize(("strain", "slope"), [("engineering", True), ("stretch", False)])
+def test_a_polynomial_in_the_stretch_has_no_slope_for_a_first_coefficient(strain: str, slope: bool) -> None:
+    """σ = Σ E_k (1 + ε)^k rises by Σ k E_k at no strain: E_1 alone may be far from it, and below 0."""
+    view = material(n_draws=100)
+    simulation = view.simulation.model_copy(update={"strain": strain})
+    numbers = next(b for b in tensile_lead(replace(view, simulation=simulation)) if isinstance(b, Numbers))
+    (card,) = (card for card in numbers.items if card.label == "First modulus E_1")
+    assert (card.note == "slope at small strain") == slope
