@@ -35,6 +35,8 @@ FIXED_POINT_TOLERANCE = 1e-6
 """Newtons between a force that depends on itself and what it was computed from."""
 SLOPES = (-1e3, 0.9)
 """Slopes of such a force that are believed."""
+NUDGE = 1e-4
+"""Step of such a force for its slope, as a share of the force scale."""
 
 
 class Terms(NamedTuple):
@@ -55,6 +57,13 @@ class Factors(NamedTuple):
     slope: Array
     columns: Columns
     beside: Array
+
+    def echoing(self, guide: Array, echo: Array) -> Factors:
+        """The force that comes to rest, by one Newton step from where it was fed with a guide (n,), N.
+
+        F = f(F) moves by the ``echo`` (n,) 1/(1 − df/dF) times what f moves by, whatever moves it.
+        """
+        return self._replace(fixed=guide + (self.fixed - guide) * echo, slope=self.slope * echo)
 
 
 class Unsigned(NamedTuple):
@@ -139,23 +148,29 @@ class Chain:
         """Whether an effect looks at what was before."""
         return any(item.memory for item in self.effects)
 
-    def terms(self, values: Values, readings: Readings, guide: Array | None = None) -> Terms:
+    def terms(
+        self, values: Values, readings: Readings, guide: Array | None = None, echo: Array | None = None
+    ) -> Terms:
         """The force's fixed part and its columns.
 
         ``values``: (B, 1) arrays, SI. ``guide`` (n,): a force estimate (N) for what depends on the
         force itself (the sign in Coulomb's law, a fixture's give); without one the muscle pulls and
-        the fixture is stiff.
+        the fixture is stiff. With the :meth:`echo` (n,) there the force answers to its own changes;
+        without it the give stays the guide's, whatever the values.
         """
-        fixed, slope, columns, _ = self.factored(values, readings, guide)
+        fixed, slope, columns, _ = self.factored(values, readings, guide, echo)
         return Terms(fixed, np.broadcast_to(slope, fixed.shape)[..., None] * columns.every())
 
-    def factored(self, values: Values, readings: Readings, guide: Array | None = None) -> Factors:
+    def factored(
+        self, values: Values, readings: Readings, guide: Array | None = None, echo: Array | None = None
+    ) -> Factors:
         """:meth:`terms` as (fixed, slope, columns): F = fixed + slope·(columns·η).
 
         The slope (B or 1, n) is what friction and gain make of the muscle's own force; multiplied out the
         columns are (1, n, p) where no parameter changes them.
         """
-        return self.unsigned(values, readings, guide).pulling(guide)
+        found = self.unsigned(values, readings, guide).pulling(guide)
+        return found if guide is None or echo is None else found.echoing(guide, echo)
 
     def unsigned(self, values: Values, readings: Readings, guide: Array | None = None) -> Unsigned:
         """:meth:`factored` but for the pull's signs: alike for all guides without :attr:`uses_force`."""
@@ -181,6 +196,19 @@ class Chain:
             guide = guide + gap / (1.0 - slope)
             force = self._force_given(guide, values, eta, readings)
         return force
+
+    def echo(self, values: Values, eta: Array, readings: Readings, guide: Array) -> Array | None:
+        """How many times a change is felt by a force (n,), N, that depends on itself: (B, n) for η (B, p).
+
+        None where nothing depends on it.
+        """
+        if not self.uses_force:
+            return None
+        step = NUDGE * self.setting.force_scale
+        low, high = (
+            self._force_given(np.atleast_2d(guide + side), values, eta, readings) for side in (-step, step)
+        )
+        return np.asarray(1.0 / (1.0 - np.clip((high - low) / (2.0 * step), *SLOPES)))
 
     def _force_given(self, guide: Array, values: Values, eta: Array, readings: Readings) -> Array:
         """Force (B, n), N, where what depends on the force is fed with a guide (B or 1, n)."""

@@ -62,7 +62,9 @@ class Data:
 class Guide:
     """A force estimate at the bins' Gauss points and at the points (N), and the slope there (N/m).
 
-    ``bin_noise`` and ``point_noise`` (N) are where the sites of Student-t noise are settled.
+    ``bin_echo`` and ``point_echo`` are how many times a force that depends on itself feels a change there
+    (:meth:`~mpam_calib.model.chain.Chain.echo`), None where none does. ``bin_noise`` and ``point_noise`` (N)
+    are where the sites of Student-t noise are settled.
     """
 
     bins: Array | None = None
@@ -70,6 +72,8 @@ class Guide:
     slope: Array | None = None
     bin_noise: Array | None = None
     point_noise: Array | None = None
+    bin_echo: Array | None = None
+    point_echo: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -190,7 +194,7 @@ class Collapsed:
         if self._strokes is not None:
             return self._even_bins(values, bins, self._strokes)
         n = len(bins)
-        terms = self.model.chain.terms(values, bins.readings, self.guide.bins)
+        terms = self.model.chain.terms(values, bins.readings, self.guide.bins, self.guide.bin_echo)
         fixed = 0.5 * (terms.fixed[:, :n] + terms.fixed[:, n:])
         columns = 0.5 * (terms.columns[:, :n] + terms.columns[:, n:])
         white, correlated, time, rough = self._noise(values)
@@ -256,7 +260,8 @@ class Collapsed:
         """Bins whose noise is Gaussian and alike in all of them."""
         assert self.model.chain is not None
         white, correlated, time, rough = self._noise(values)
-        fixed, slope, linear, _ = self.model.chain.factored(values, bins.readings, self.guide.bins)
+        guide, echo = self.guide.bins, self.guide.bin_echo
+        fixed, slope, linear, _ = self.model.chain.factored(values, bins.readings, guide, echo)
         columns = linear.every()
         n, B, p = len(bins), len(white), columns.shape[-1]
         slope = 0.5 * np.broadcast_to(slope, (len(slope), 2 * n))
@@ -280,11 +285,15 @@ class Collapsed:
         return bins is not None and not others and not bool(bins.slack.any())
 
     @cached_property
-    def _node_guide(self) -> Array | None:
-        """The guide's force (N) at the bins' nodes."""
+    def _node_guide(self) -> tuple[Array | None, Array | None]:
+        """The guide's force (N) at the bins' nodes, and its echo there."""
         assert self.data.bins is not None
-        bins = self.data.bins
-        return bins.nodes.interpolate(self.guide.bins, bins.readings, bins.segment)
+        bins, guide = self.data.bins, self.guide
+        force, echo = (
+            bins.nodes.interpolate(halves, bins.readings, bins.segment)
+            for halves in (guide.bins, guide.bin_echo)
+        )
+        return force, echo
 
     @cached_property
     def _strokes(self) -> Strokes | None:
@@ -333,14 +342,14 @@ class Collapsed:
         """Bins without correlated noise and remainder: all rows count, at less cost."""
         assert self.model.chain is not None
         nodes = bins.nodes
-        fixed, slope, linear, _ = self.model.chain.factored(values, nodes.readings, self._node_guide)
+        fixed, slope, linear, _ = self.model.chain.factored(values, nodes.readings, *self._node_guide)
         white = values[WHITE][:, 0]
         piece = white_terms(nodes, bins.averaged, fixed, slope, linear.every(), white)
         return Piece(*piece).widened(sum(self.model.linear_sizes))
 
     def _points(self, values: Values, points: Points, slack: list[Slack], free: list[FreeRows]) -> Piece:
         assert self.model.chain is not None
-        terms = self.model.chain.terms(values, points.readings, self.guide.points)
+        terms = self.model.chain.terms(values, points.readings, self.guide.points, self.guide.point_echo)
         design = self._design(values, terms.columns, self._point_remainder)
         B = len(design)
         variance = np.broadcast_to(values[WHITE] ** 2, (B, len(points))).copy()

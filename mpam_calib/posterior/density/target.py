@@ -26,6 +26,8 @@ GUIDE_ROUNDS, SITE_ROUNDS = 4, 12
 """Rounds in which guide forces, and sites of heavy-tailed noise, may settle."""
 GUIDE_TOLERANCE = 0.02
 """Share of the noise by which a guide force may still move between rounds."""
+ECHO_TOLERANCE = 0.005
+"""Share of itself by which the echo of a force that depends on itself may still move, on average."""
 SITE_TOLERANCE = 0.02
 """Share of the typical noise by which that of a heavy-tailed row may still move."""
 PULL = 1e-6
@@ -65,13 +67,15 @@ def without_level(specimen: Specimen, target: Collapsed, level: int) -> Collapse
         bins = _bins(specimen.loops, target.model, level)
         if bins is not None and 2 * len(bins) == int(there.sum()):
             noise = None if guide.bin_noise is None else guide.bin_noise[there[: len(there) // 2]]
-            guide = replace(guide, bins=None if guide.bins is None else guide.bins[there], bin_noise=noise)
+            halves = [None if x is None else x[there] for x in (guide.bins, guide.bin_echo)]
+            guide = replace(guide, bins=halves[0], bin_echo=halves[1], bin_noise=noise)
         else:
-            guide = replace(guide, bins=_measured(replace(data, bins=bins)).bins, bin_noise=None)
+            measured = _measured(replace(data, bins=bins)).bins
+            guide = replace(guide, bins=measured, bin_echo=None, bin_noise=None)
     if points is not None:
         kept = points.level(specimen.levels_Pa) != level
         points = points.take(kept) if kept.any() else None
-        at = {name: getattr(guide, name) for name in ("points", "slope", "point_noise")}
+        at = {name: getattr(guide, name) for name in ("points", "slope", "point_noise", "point_echo")}
         guide = replace(guide, **{name: None if x is None else x[kept] for name, x in at.items()})
     return replace(target, data=replace(data, bins=bins, points=points), guide=guide)
 
@@ -150,10 +154,17 @@ def _guide(target: Collapsed, u: Array) -> Guide:
     model, data = target.model, target.data
     values = model.values(u[None])
     eta = target.linear_mean(values)
-    bins = None if data.bins is None else predict_force(model, values, eta, data.bins.readings)[0]
+
+    def estimate(readings: Readings) -> tuple[Array, Array | None]:
+        assert model.chain is not None
+        force = predict_force(model, values, eta, readings)[0]
+        echo = model.chain.echo(values, eta[:, : model.linear_sizes[0]], readings, force)
+        return force, None if echo is None else echo[0]
+
+    bins, bin_echo = (None, None) if data.bins is None else estimate(data.bins.readings)
     heavy = _heavy_noise(target, values)
     if data.points is None or model.setting is None:
-        return Guide(bins, bin_noise=heavy[0])
+        return Guide(bins, bin_noise=heavy[0], bin_echo=bin_echo)
     rows = data.points.readings
     step = SLOPE_STEP * model.setting.geometry.L0
     shifted = [
@@ -161,7 +172,8 @@ def _guide(target: Collapsed, u: Array) -> Guide:
         for side in (-1.0, 1.0)
     ]
     slope = (shifted[1] - shifted[0]) / (2.0 * step)
-    return Guide(bins, predict_force(model, values, eta, rows)[0], slope, *heavy)
+    points, point_echo = estimate(rows)
+    return Guide(bins, points, slope, *heavy, bin_echo, point_echo)
 
 
 def _heavy_noise(target: Collapsed, values: dict[str, Array]) -> tuple[Array | None, Array | None]:
@@ -191,6 +203,12 @@ def _matters(target: Collapsed, guide: Guide) -> bool:
             continue
         typical = float(np.median(np.abs(noise)))
         if before is None or float(np.max(np.abs(noise - before))) > SITE_TOLERANCE * typical:
+            return True
+    for echo, before in ((guide.bin_echo, old.bin_echo), (guide.point_echo, old.point_echo)):
+        # Compliance and moduli may trade places where the force stays.
+        if echo is not None and (
+            before is None or float(np.mean(np.abs(echo / before - 1.0))) > ECHO_TOLERANCE
+        ):
             return True
     signs = any(item is not None and bool(np.any(item < 0.0)) for item in (guide.bins, guide.points))
     slopes = data.points is not None and bool(np.any(data.points.kind == FREE))
