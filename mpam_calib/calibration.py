@@ -15,7 +15,8 @@ from mpam_calib.model.model import Model
 from mpam_calib.posterior.chains.checkpoint import Checkpoint
 from mpam_calib.posterior.chains.convergence import ESS_WANTED
 from mpam_calib.posterior.chains.sampling import MAX_STEPS, Listener, Sampling, sample
-from mpam_calib.posterior.density.collapsed import Collapsed, Guide
+from mpam_calib.posterior.density.collapsed import Collapsed
+from mpam_calib.posterior.density.guide import Guide
 from mpam_calib.posterior.density.mode import Mode
 from mpam_calib.posterior.density.target import build_target, locate
 from mpam_calib.posterior.draws import Draws, Reported, keep_draws, kept_for, reported

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.blueprint import MaterialPosterior, draw_blueprint
 from mpam_calib.model.model import build_model
-from mpam_calib.posterior.density.collapsed import Collapsed, Data, Guide
+from mpam_calib.posterior.density.collapsed import Collapsed, Data
+from mpam_calib.posterior.density.guide import Guide
 from mpam_calib.posterior.density.mode import Mode, climb, curvature, evaluate, starts
 from mpam_calib.posterior.likelihood.tensile_points import gather_tensile
 from mpam_calib.specimen.recording import Specimen

@@ -13,12 +13,13 @@ from model import build
 
 from mpam_calib.model.blueprint import Options
 from mpam_calib.model.readings import Readings
-from mpam_calib.posterior.density.collapsed import Collapsed, Guide
-from mpam_calib.posterior.density.target import _guide, build_target, locate, predict_force
+from mpam_calib.posterior.density.collapsed import Collapsed
+from mpam_calib.posterior.density.guide import Guide
+from mpam_calib.posterior.density.target import _guide, build_target, locate, predict_force, without_level
 from mpam_calib.specimen.declaration import Noise
 from mpam_calib.specimen.recording import ForceMap, Specimen
 
-from .giving import GEOMETRY, giving
+from .giving import GEOMETRY, NOISE, giving
 
 Array = np.ndarray
 CORRELATED = Options(remainder=False)
@@ -107,6 +108,34 @@ def test_an_echo_is_that_of_the_force_and_not_of_the_noise(name: str) -> None:
     differences = [np.diff(found.log_likelihood(values)), np.diff(same.log_likelihood(louder))]
     assert np.abs(differences[1]).min() > 10.0
     np.testing.assert_allclose(*differences, rtol=1e-9)
+
+
+def test_the_truth_leaves_no_residual_at_the_nodes() -> None:
+    """With the fixture's give under forces that bins' means made up it left up to 13 N, without any noise."""
+    truth = giving(noise=0.0)
+    target = build_target(truth.specimen, truth.blueprint)
+    assert target.white_only and target.data.bins is not None and target.model.chain is not None
+    nodes = target.data.bins.nodes
+    settled, _ = locate(target, np.random.default_rng(0))
+    guide = settled.guide.at_nodes(target.data.bins)
+    terms = target.model.chain.terms(truth.values, nodes.readings, *guide)
+    # The force there itself, not the parabola through the bin's readings, which is off by a little.
+    force = predict_force(target.model, truth.values, truth.eta, nodes.readings)[0]
+    left = force - terms.fixed[0] - terms.columns[0] @ truth.eta[0]
+    assert np.abs(left).max() < 0.05 * NOISE
+
+
+def test_a_fold_keeps_the_guide_of_what_is_left() -> None:
+    made = giving()
+    target, _ = locate(build_target(made.specimen, made.blueprint), np.random.default_rng(0))
+    fold = without_level(made.specimen, target, 1)
+    whole, left = target.data.bins, fold.data.bins
+    assert whole is not None and left is not None and 0 < len(left) < len(whole)
+    for bins, guide in ((whole, target.guide), (left, fold.guide)):
+        sizes = [len(x) for x in (guide.bins, guide.bin_echo, guide.nodes, guide.node_echo) if x is not None]
+        assert sizes == [2 * len(bins)] * 2 + [len(bins.nodes.force)] * 2
+    kept = whole.nodes.readings.level != 1
+    np.testing.assert_array_equal(fold.guide.nodes, target.guide.nodes[kept])
 
 
 def as_map(made: Specimen) -> ForceMap:

@@ -11,7 +11,7 @@ from model import build
 from scipy import stats
 
 from mpam_calib.model.blueprint import Options, draw_blueprint
-from mpam_calib.posterior.density.collapsed import Guide
+from mpam_calib.posterior.density.guide import Guide
 from mpam_calib.posterior.density.target import build_target, locate, predict_force
 from mpam_calib.specimen.declaration import Fit, Noise, Sensors
 from mpam_calib.specimen.recording import (

@@ -11,7 +11,7 @@ from scipy import special, stats
 
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.noise import FREEDOM, GROWTH, WHITE
-from mpam_calib.posterior.density.collapsed import Guide
+from mpam_calib.posterior.density.guide import Guide
 from mpam_calib.posterior.density.target import build_target, locate, predict_force
 from mpam_calib.posterior.likelihood.sites import FreeRows, Sites, chunk_log_likelihood, usual_chunks
 from mpam_calib.specimen.declaration import Noise

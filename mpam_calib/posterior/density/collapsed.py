@@ -21,6 +21,7 @@ from mpam_calib.model.model import CONTRACTION_SD, Model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.model.tensile import MISFIT, NOISE
+from mpam_calib.posterior.density.guide import Guide
 from mpam_calib.posterior.density.piece import Piece, forget, segment_piece, total, white_piece
 from mpam_calib.posterior.density.slack import Slack, with_slack
 from mpam_calib.posterior.likelihood.algebra import (
@@ -59,24 +60,6 @@ class Data:
 
 
 @dataclass(frozen=True)
-class Guide:
-    """A force estimate at the bins' Gauss points and at the points (N), and the slope there (N/m).
-
-    ``bin_echo`` and ``point_echo`` are how many times a force that depends on itself feels a change there
-    (:meth:`~mpam_calib.model.chain.Chain.echo`), None where none does. ``bin_noise`` and ``point_noise`` (N)
-    are where the sites of Student-t noise are settled.
-    """
-
-    bins: Array | None = None
-    points: Array | None = None
-    slope: Array | None = None
-    bin_noise: Array | None = None
-    point_noise: Array | None = None
-    bin_echo: Array | None = None
-    point_echo: Array | None = None
-
-
-@dataclass(frozen=True)
 class Collapsed:
     """ln p(y | θ) for many θ at once, and exact draws of the linear coordinates."""
 
@@ -91,7 +74,7 @@ class Collapsed:
         parts = (bins, points, None if tensile is None else tensile.strain)
         readings = sum(len(part) for part in parts if part is not None)
         saved = 0 if bins is None or self._strokes is None else len(bins) * self._strokes.saved
-        if bins is not None and self._white_only:
+        if bins is not None and self.white_only:
             readings += len(bins.nodes.force) // 2 - len(bins)
         return readings * (1 + sum(self.model.linear_sizes)) - saved
 
@@ -189,7 +172,7 @@ class Collapsed:
         assert self.model.chain is not None
         dof = values[FREEDOM][:, 0] if FREEDOM in values else None
         uneven = GROWTH in values or dof is not None
-        if self._white_only:
+        if self.white_only:
             return self._white_bins(values, bins)
         if self._strokes is not None:
             return self._even_bins(values, bins, self._strokes)
@@ -278,7 +261,7 @@ class Collapsed:
         return Piece(full[:, :-1, :-1], full[:, :-1, -1], constant).widened(sum(self.model.linear_sizes))
 
     @cached_property
-    def _white_only(self) -> bool:
+    def white_only(self) -> bool:
         """Whether all bins have readings whose noise is white and of one size."""
         bins = self.data.bins
         others = {GROWTH, FREEDOM, CORRELATED, ROUGH} & set(self.model.names)
@@ -288,12 +271,7 @@ class Collapsed:
     def _node_guide(self) -> tuple[Array | None, Array | None]:
         """The guide's force (N) at the bins' nodes, and its echo there."""
         assert self.data.bins is not None
-        bins, guide = self.data.bins, self.guide
-        force, echo = (
-            bins.nodes.interpolate(halves, bins.readings, bins.segment)
-            for halves in (guide.bins, guide.bin_echo)
-        )
-        return force, echo
+        return self.guide.at_nodes(self.data.bins)
 
     @cached_property
     def _strokes(self) -> Strokes | None:

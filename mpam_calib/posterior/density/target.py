@@ -12,7 +12,8 @@ from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, WHITE
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import ROUGH, SMOOTH
-from mpam_calib.posterior.density.collapsed import Collapsed, Data, Guide
+from mpam_calib.posterior.density.collapsed import Collapsed, Data
+from mpam_calib.posterior.density.guide import Guide
 from mpam_calib.posterior.density.mode import Mode, climb_modes, find_modes
 from mpam_calib.posterior.likelihood.bins import LoopBins, bin_loops
 from mpam_calib.posterior.likelihood.points import FREE, floor_of, gather_points
@@ -30,8 +31,6 @@ ECHO_TOLERANCE = 0.005
 """Share of itself by which the echo of a force that depends on itself may still move, on average."""
 SITE_TOLERANCE = 0.02
 """Share of the typical noise by which that of a heavy-tailed row may still move."""
-PULL = 1e-6
-"""Newtons that are enough to say which way a force acts."""
 SLOPE_STEP = 1e-3
 """Contraction step of the slope at a free contraction."""
 
@@ -52,7 +51,7 @@ def build_target(specimen: Specimen, blueprint: Blueprint) -> Collapsed:
         tensile=tensile,
         floor=floor_of(specimen.sensors.force_floor_N, points),
     )
-    return Collapsed(model, data, _measured(data))
+    return Collapsed(model, data, Guide.measured(data.bins))
 
 
 def without_level(specimen: Specimen, target: Collapsed, level: int) -> Collapsed:
@@ -63,20 +62,12 @@ def without_level(specimen: Specimen, target: Collapsed, level: int) -> Collapse
     data, guide = target.data, target.guide
     bins, points = data.bins, data.points
     if specimen.loops is not None and bins is not None:
-        there = bins.readings.level != level
-        bins = _bins(specimen.loops, target.model, level)
-        if bins is not None and 2 * len(bins) == int(there.sum()):
-            noise = None if guide.bin_noise is None else guide.bin_noise[there[: len(there) // 2]]
-            halves = [None if x is None else x[there] for x in (guide.bins, guide.bin_echo)]
-            guide = replace(guide, bins=halves[0], bin_echo=halves[1], bin_noise=noise)
-        else:
-            measured = _measured(replace(data, bins=bins)).bins
-            guide = replace(guide, bins=measured, bin_echo=None, bin_noise=None)
+        whole, bins = bins, _bins(specimen.loops, target.model, level)
+        guide = guide.of_bins_left(whole, bins, level)
     if points is not None:
         kept = points.level(specimen.levels_Pa) != level
         points = points.take(kept) if kept.any() else None
-        at = {name: getattr(guide, name) for name in ("points", "slope", "point_noise", "point_echo")}
-        guide = replace(guide, **{name: None if x is None else x[kept] for name, x in at.items()})
+        guide = guide.of_points(kept)
     return replace(target, data=replace(data, bins=bins, points=points), guide=guide)
 
 
@@ -91,14 +82,6 @@ def _bins(loops: Loops, model: Model, without: int | None = None) -> LoopBins | 
     return bin_loops(
         replace(loops, unclear=out if loops.unclear is None else out | loops.unclear), memory=memory
     )
-
-
-def _measured(data: Data) -> Guide:
-    """The first estimate of the force: the measured one, which may push. What a floor hides still pulls."""
-    if data.bins is None:
-        return Guide()
-    force = np.where(data.bins.slack, np.maximum(data.bins.force, PULL), data.bins.force)
-    return Guide(np.concatenate([force, force]))
 
 
 def locate(target: Collapsed, rng: np.random.Generator) -> tuple[Collapsed, list[Mode]]:
@@ -162,9 +145,13 @@ def _guide(target: Collapsed, u: Array) -> Guide:
         return force, None if echo is None else echo[0]
 
     bins, bin_echo = (None, None) if data.bins is None else estimate(data.bins.readings)
+    nodes, node_echo = None, None
+    if data.bins is not None and bin_echo is not None and target.white_only:
+        nodes, node_echo = estimate(data.bins.nodes.readings)
     heavy = _heavy_noise(target, values)
+    loops = Guide(bins, bin_noise=heavy[0], nodes=nodes, bin_echo=bin_echo, node_echo=node_echo)
     if data.points is None or model.setting is None:
-        return Guide(bins, bin_noise=heavy[0], bin_echo=bin_echo)
+        return loops
     rows = data.points.readings
     step = SLOPE_STEP * model.setting.geometry.L0
     shifted = [
@@ -173,7 +160,7 @@ def _guide(target: Collapsed, u: Array) -> Guide:
     ]
     slope = (shifted[1] - shifted[0]) / (2.0 * step)
     points, point_echo = estimate(rows)
-    return Guide(bins, points, slope, *heavy, bin_echo, point_echo)
+    return replace(loops, points=points, slope=slope, point_noise=heavy[1], point_echo=point_echo)
 
 
 def _heavy_noise(target: Collapsed, values: dict[str, Array]) -> tuple[Array | None, Array | None]:
@@ -204,7 +191,8 @@ def _matters(target: Collapsed, guide: Guide) -> bool:
         typical = float(np.median(np.abs(noise)))
         if before is None or float(np.max(np.abs(noise - before))) > SITE_TOLERANCE * typical:
             return True
-    for echo, before in ((guide.bin_echo, old.bin_echo), (guide.point_echo, old.point_echo)):
+    for name in ("bin_echo", "node_echo", "point_echo"):
+        echo, before = getattr(guide, name), getattr(old, name)
         # Compliance and moduli may trade places where the force stays.
         if echo is not None and (
             before is None or float(np.mean(np.abs(echo / before - 1.0))) > ECHO_TOLERANCE
@@ -216,7 +204,7 @@ def _matters(target: Collapsed, guide: Guide) -> bool:
         return False
     setting = chain.setting
     tolerance = GUIDE_TOLERANCE * (setting.force_sd or 0.003 * setting.force_scale)
-    pairs = [(guide.bins, old.bins), (guide.points, old.points)]
+    pairs = [(guide.bins, old.bins), (guide.nodes, old.nodes), (guide.points, old.points)]
     return any(
         new is not None and (before is None or float(np.max(np.abs(new - before))) > tolerance)
         for new, before in pairs
