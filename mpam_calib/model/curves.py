@@ -37,8 +37,9 @@ def box_cox(ratio: Array, exponent: Array) -> Array:
 
 
 def settled(past: Array, constant: Array, reference: float) -> Array:
-    """1 − exp(−past/constant), of a time or of a pressure, over its value at the reference."""
-    return np.asarray(np.expm1(-past / constant) / np.expm1(-reference / constant))
+    """1 − exp(−past/constant), of a time or of a pressure, over its value at the reference; 0 below 0."""
+    # A gauge may read below 0, where the exponential grows without bound.
+    return np.asarray(np.expm1(-np.maximum(past, 0.0) / constant) / np.expm1(-reference / constant))
 
 
 def middle_pressure(setting: Setting) -> float:

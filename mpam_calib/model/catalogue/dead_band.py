@@ -31,9 +31,9 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
 
 
 def _soft(state: State, values: Values, setting: Setting) -> State:
-    """A gradual onset: the work lost grows to P_DB as the pressure passes it."""
+    """A gradual onset: the work lost grows to P_DB as the pressure passes it; none is lost below 0."""
     band = values["P_DB_kPa"]
-    lost = band * -np.expm1(-state.pressure / np.maximum(np.abs(band), 1.0))
+    lost = band * -np.expm1(-np.maximum(state.pressure, 0.0) / np.maximum(np.abs(band), 1.0))
     return state._replace(pressure=np.maximum(state.pressure - lost, 0.0))
 
 
