@@ -24,6 +24,7 @@ from mpam_calib.posterior.early_root import without_early_roots
 from mpam_calib.posterior.material import material_of
 from mpam_calib.posterior.summary import all_converged, summarise
 from mpam_calib.prediction.bands import muscle_bands, stress_bands
+from mpam_calib.prediction.recorded import Recorded
 from mpam_calib.specimen.arguments import (
     demand_number,
     demand_optional,
@@ -78,7 +79,7 @@ class Calibration:
             pressures_kPa = demand_pressures("pressures_kPa", pressures_kPa)
             if self.model.chain is None:
                 raise InputError("pressures_kPa", "pressures", "none for a material without a muscle")
-        return predict(self.model, self.draws, self.seed, pressures_kPa)
+        return predict(self.model, self.draws, self.seed, pressures_kPa, Recorded.of(self.specimen))
 
 
 def predict(
@@ -86,14 +87,18 @@ def predict(
     draws: Draws,
     seed: int,
     pressures_kPa: Array | list[float] | None = None,
+    recorded: Recorded | None = None,
 ) -> pd.DataFrame:
-    """Bands of everything the model predicts: the muscle's at the pressures, the material's stress."""
+    """Bands of everything the model predicts: the muscle's at the pressures, the material's stress.
+
+    ``recorded`` marks what it does not hold as extrapolated.
+    """
     parts = []
     if model.chain is not None:
         pressures = (
             np.array(model.blueprint.levels) if pressures_kPa is None else np.asarray(pressures_kPa) * KPA
         )
-        parts.append(muscle_bands(model, draws, pressures, seed))
+        parts.append(muscle_bands(model, draws, pressures, seed, recorded=recorded))
     if model.tensile is not None:
         parts.append(stress_bands(model, draws, seed))
     return pd.concat(parts, ignore_index=True)

@@ -14,9 +14,18 @@ from mpam_calib.model.effect import Values
 from mpam_calib.model.priors import Parameter
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.state import Setting, State
+from mpam_calib.specimen.declaration import Simulation
 from mpam_calib.units import level_labels
 
 Array = NDArray[np.float64]
+
+FRICTIONS = {"coulomb_friction", "strand_friction"}
+"""Effects that are a friction."""
+
+
+def rubs(simulation: Simulation) -> bool:
+    """Whether a simulation has any friction, declared as such or among its effects."""
+    return simulation.friction != "none" or bool(FRICTIONS & set(simulation.effect_ids))
 
 
 @dataclass(frozen=True)

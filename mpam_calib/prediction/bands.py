@@ -20,6 +20,7 @@ from mpam_calib.prediction.curves import (
     force_curves,
     pressure_rng,
 )
+from mpam_calib.prediction.recorded import Recorded
 from mpam_calib.units import KPA
 
 Array = NDArray[np.float64]
@@ -44,11 +45,18 @@ ROOTLESS = 0.05
 """Share of curves without a root above which a free contraction is marked extrapolated."""
 
 
-def muscle_bands(model: Model, draws: Draws, pressures: Array, seed: int, trim: bool = True) -> pd.DataFrame:
+def muscle_bands(
+    model: Model,
+    draws: Draws,
+    pressures: Array,
+    seed: int,
+    trim: bool = True,
+    recorded: Recorded | None = None,
+) -> pd.DataFrame:
     """Bands on force, blocked force and free contraction at pressures (Pa), each also ``_observed``.
 
     Curves end at the first grid point at or beyond the mean free contraction (``trim``). A pressure's bands
-    are the same whichever others are asked for.
+    are the same whichever others are asked for. Without ``recorded`` both branches are taken for recorded.
     """
     reach = Reach.of(model.blueprint)
     grid = contraction_grid(model, float(reach.contraction.max()))
@@ -64,7 +72,8 @@ def muscle_bands(model: Model, draws: Draws, pressures: Array, seed: int, trim: 
         suffix = "_observed" if observed else ""
         for j, branch in enumerate(BRANCHES):
             table = _table(f"force_N{suffix}", pressures, grid, branch, curves.force[:, :, j] + curve)
-            table["extrapolated"] = unseen.ravel()
+            told = recorded is None or recorded.tells(branch, model)
+            table["extrapolated"] = unseen.ravel() if told else True
             if trim:
                 end = np.searchsorted(grid, free.mean(axis=0) - 1e-12)
                 table = table[(np.arange(len(grid))[None, :] <= end[:, None]).ravel()]

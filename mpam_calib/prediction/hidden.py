@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.effect import effect, known_effects
+from mpam_calib.model.friction import rubs
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.noise import CORRELATED, WHITE
 from mpam_calib.model.readings import Readings
@@ -20,9 +21,8 @@ from mpam_calib.units import si_factor
 Array = NDArray[np.float64]
 
 PLACE = "--hide"
-FRICTIONS = {"coulomb_friction", "strand_friction"}
 OF_FRICTION = {"presliding", "rate_friction"}
-"""Effects that are a friction, and those that only change one."""
+"""Effects that only change a friction."""
 TYPICAL = 1.0
 """Standard normal image of a hidden effect's default size: a large but ordinary draw of its prior."""
 FARTHEST = 6.0
@@ -85,9 +85,8 @@ def with_hidden(
                 raise InputError(PLACE, f'"{identifier}"', f"an effect without the declared {parameter.name}")
             values[parameter.name] = np.full((1, 1), value)
             hidden[declared][parameter.name] = value / factor
-    rubs = blueprint.simulation.friction != "none" or FRICTIONS & set(blueprint.simulation.effect_ids)
     for identifier in sorted(OF_FRICTION & {declared.partition(":")[0] for declared in hidden}):
-        if not rubs:
+        if not rubs(blueprint.simulation):
             raise InputError(PLACE, f"{identifier} without friction", "a friction that it can change")
     return build_model(blueprint), hidden
 

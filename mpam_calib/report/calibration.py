@@ -11,6 +11,7 @@ from mpam_calib.report import wording
 from mpam_calib.report.figures import corner, loops, pressure, priors, residuals
 from mpam_calib.report.held import held_between
 from mpam_calib.report.numbers import decimals, fixed, significant, with_band
+from mpam_calib.report.one_branch import pull_of
 from mpam_calib.report.page import (
     Block,
     DataTable,
@@ -54,7 +55,9 @@ def _lead(view: CalibrationView) -> list[Block]:
         value, band = _band(blocked)
         parts.append(Markup("pulls with ") + spoken(value, band, "N", " when it is held at full length"))
         cards.append(
-            KeyNumber("Blocked force", value, "N", f"90 % band: {band} N", f"at {top:.4g} kPa, friction-free")
+            KeyNumber(
+                "Blocked force", value, "N", f"90 % band: {band} N", f"at {top:.4g} kPa, {pull_of(view)}"
+            )
         )
     free = view.at_level("free_contraction", top)
     if free is not None:

@@ -26,6 +26,7 @@ from mpam_calib.report.held import (
 from mpam_calib.report.limit import Limit
 from mpam_calib.report.noise_size import NOISE_CAUTION, lasting_noise, noise_as_declared, noise_size
 from mpam_calib.report.numbers import significant
+from mpam_calib.report.one_branch import one_branch
 from mpam_calib.report.reach import UNSEEN, between_ends, cut_off, extrapolation, still_pulling
 from mpam_calib.report.view import CalibrationView
 
@@ -253,6 +254,7 @@ CHECKS: tuple[Check, ...] = (
         lambda view: not view.tensile and cut_off(view) is None,
     ),
     Check(cut_off),
+    Check(one_branch),
     Check(between_ends),
     Check(source),
     Check(gauge),

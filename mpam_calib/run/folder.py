@@ -16,6 +16,7 @@ from mpam_calib.calibration import Calibration
 from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.posterior.chains.checkpoint import Checkpoint, sweep
 from mpam_calib.posterior.stored import POSTERIOR, RUN_FILE, readable, write_draws
+from mpam_calib.prediction.recorded import RECORDED, Recorded
 from mpam_calib.run.asked import LEFT_OUT, kept_left_out
 from mpam_calib.run.files import CHECKPOINT, write_csv, write_json
 from mpam_calib.run.kept import written_over
@@ -117,6 +118,7 @@ def describe(calibration: Calibration, digest: str) -> dict[str, Any]:
         "versions": versions(),
         "specimen": {"name": specimen.name, "bladder_material": specimen.bladder_material},
         "blueprint": calibration.model.blueprint.model_dump(mode="json"),
+        RECORDED: Recorded.of(specimen).as_json(),
         "sampling": {
             "ensembles": ensembles,
             "walkers": walkers,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mpam_calib.calibration import predict
 from mpam_calib.errors import InputError
 from mpam_calib.posterior.stored import load_run
+from mpam_calib.prediction.recorded import Recorded
 from mpam_calib.run.asked import remarks
 from mpam_calib.run.files import demand_writable, write_csv
 from mpam_calib.specimen.plausibility import HIGHEST_LEVEL_KPA
@@ -81,7 +82,8 @@ def predict_to_folder(run: Path, pressures_kPa: Array | None, seed: int | None =
         levels = np.array(model.blueprint.levels) / KPA if pressures_kPa is None else pressures_kPa
         chunks = [levels[i : i + AT_ONCE] for i in range(0, len(levels), AT_ONCE)]
         # The material's bands, where there are any, are the same in every part.
-        parts = [predict(model, stored.draws, seed, chunk) for chunk in chunks]
+        recorded = Recorded.kept(stored.state)
+        parts = [predict(model, stored.draws, seed, chunk, recorded) for chunk in chunks]
         table = pd.concat(parts, ignore_index=True)
         tables = [rows for _, rows in table.groupby(["quantity", "branch"], sort=False)]
         table = pd.concat(tables, ignore_index=True).drop_duplicates(ignore_index=True)
