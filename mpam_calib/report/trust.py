@@ -12,7 +12,8 @@ from typing import Final
 
 from mpam_calib.posterior.chains.convergence import RHAT_LIMIT
 from mpam_calib.report.blocks import Level, Verdict
-from mpam_calib.report.doubts import Z90, look_first, overruled_slack, wandering
+from mpam_calib.report.doubts import look_first, overruled_slack, wandering
+from mpam_calib.report.gauge import gauge
 from mpam_calib.report.held import (
     Held,
     along_stroke,
@@ -41,10 +42,6 @@ UNIDENTIFIED: Final = 0.20
 """A posterior that is narrower than its prior by less than this share learnt nothing."""
 LITTLE: Final = 0.50
 """One that is narrower by less than this share learnt a little, and the prior still matters."""
-GAUGE_SHARE: Final = 0.5
-"""The gauge limits the result when it makes up this share of the band ..."""
-GAUGE_TAKEN_UP: Final = 2.0
-"""... and where it would make up this many of the band, free parameters have taken up its offset."""
 NAMED, NAMED_BRIEFLY = 5, 2
 """Parameters that a sentence names, and the verdict."""
 _RANK: dict[Level, int] = {"good": 0, "caution": 1, "bad": 2}
@@ -118,35 +115,6 @@ def band_width(view: CalibrationView) -> Limit | None:
     if math.isinf(worst):
         words = "a headline number is zero within its band"
     return Limit(level, f"{words[0].upper()}{words[1:]} (half of its 90 % band).", words)
-
-
-def gauge(view: CalibrationView) -> Limit | None:
-    """The declared uncertainty of the pressure gauge makes up most of the band."""
-    if view.tensile or view.pressure_bias_sd_kPa <= 0:
-        return None
-    rows = view.quantity("blocked_force_N")
-    rows = rows[rows["pressure_kPa"] <= view.top_level_kPa * (1 + 1e-9)]
-    if len(rows) < 2:
-        return None
-    P, F = rows["pressure_kPa"].to_numpy(), rows["mean"].to_numpy()
-    slope = abs(float(F[-1] - F[-2]) / float(P[-1] - P[-2])) if P[-1] > P[-2] else 0.0
-    newtons = Z90 * view.pressure_bias_sd_kPa * slope
-    row = rows.iloc[-1]
-    half = float(row["q95"] - row["q05"]) / 2.0
-    if newtons < GAUGE_SHARE * half or half <= 0:
-        return None
-    worth = f"± {significant(newtons, 2)} N (90 %, by pressure_bias_sd_kPa = {view.pressure_bias_sd_kPa:g})"
-    if newtons > GAUGE_TAKEN_UP * half:
-        sentence = (
-            "The bands hold for pressures as this gauge reads them: whatever constant offset it has, the fit "
-            f"has made up for it. By a gauge that has none, forces may differ by {worth} more."
-        )
-        return Limit("good", sentence, "the bands hold for pressures as this gauge reads them")
-    sentence = (
-        f"The pressure gauge sets the width of the band: its offset alone is worth {worth}. More loops do "
-        "not help; a better gauge does."
-    )
-    return Limit("good", sentence, "the pressure gauge sets the width of the band")
 
 
 def identification(view: CalibrationView) -> Limit | None:
