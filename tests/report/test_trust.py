@@ -45,14 +45,27 @@ def test_nothing_to_remark(sound: CalibrationView) -> None:
     ("learnt", "praised", "told"),
     [(0.9, True, False), (0.5, True, False), (0.45, False, True), (0.1, False, False)],
 )
-def test_parameters_are_called_identified_by_the_table_s_limit(
+def test_parameters_are_called_narrowed_by_the_table_s_limit(
     sound: CalibrationView, learnt: float, praised: bool, told: bool
 ) -> None:
     frame = sound.unidentified.assign(contraction=0.9)
     frame.loc[frame.index[0], "contraction"] = learnt
     view = replace(sound, unidentified=frame)
-    assert ("every parameter is identified" in trust.assess(view).reasons[-1]) == praised
+    fine = trust.assess(view).reasons[-1]
+    assert ("narrow every parameter to at most 50 % of the band assumed before" in fine) == praised
     assert learnt_table(view)["what that means"].str.contains("the prior still matters").any() == told
+
+
+def test_what_leaves_a_sign_open_or_mixes_explanations_is_not_called_identified(
+    sound: CalibrationView,
+) -> None:
+    summary = sound.summary.copy()
+    summary.loc[summary["parameter"] == "K_f", ["q05", "q95"]] = -0.1, 0.2
+    view = replace(sound, summary=summary, unidentified=sound.unidentified.assign(contraction=0.9))
+    assert learnt_table(view)["what that means"].str.contains("leave its sign open").any()
+    fine = trust.assess(view).reasons[-1]
+    assert "identified" not in fine and "narrow every parameter" in fine
+    assert "narrow every parameter" not in trust.assess(settled(view, modes=2)).reasons[-1]
 
 
 @pytest.mark.parametrize(
