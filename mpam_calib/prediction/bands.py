@@ -18,6 +18,7 @@ from mpam_calib.prediction.curves import (
     contraction_grid,
     first_root,
     force_curves,
+    past,
     pressure_rng,
 )
 from mpam_calib.prediction.recorded import Recorded
@@ -41,6 +42,8 @@ COLUMNS = [
 DRAWS = 2000
 QUANTILES = [0.05, 0.25, 0.5, 0.75, 0.95]
 STRESS_POINTS = 101
+REACH_DRAWS = 200
+"""Draws behind a mean free contraction that only says how far readings reach."""
 ROOTLESS = 0.05
 """Share of curves without a root above which a free contraction is marked extrapolated."""
 
@@ -64,8 +67,8 @@ def muscle_bands(
     noise = [_Noise.draw(curves, j, pressure_rng(seed, 5, P)) for j, P in enumerate(pressures)]
     free = first_root(grid, curves.force[:, :, 2])
     outside = reach.outside(pressures)
-    at = pressures[:, None]
-    unseen = reach.beyond(at, grid) | reach.before(at, grid) | outside[:, None]
+    furthest = _furthest(reach, model, draws, pressures, free, grid, seed)
+    unseen = past(furthest[:, None], grid) | reach.before(pressures[:, None], grid) | outside[:, None]
     parts = []
     for observed in (False, True):
         curve = np.stack([each.curve for each in noise], axis=1) if observed else 0.0
@@ -88,11 +91,33 @@ def muscle_bands(
         table = _table(f"blocked_force_N{suffix}", pressures, np.zeros(1), "", blocked[:, :, None])
         parts.append(table.assign(extrapolated=unseen[:, 0]))
         table = _table(f"free_contraction{suffix}", pressures, np.zeros(1), "", contraction[:, :, None])
-        # A curve that never reaches zero ends at the grid's edge: that is no free contraction.
-        rootless = np.mean(free >= grid[-1], axis=0) > ROOTLESS
-        table["extrapolated"] = outside | rootless | reach.beyond(pressures, free.mean(axis=0))
+        rootless = np.isnan(_mean_free(free, grid))
+        table["extrapolated"] = outside | rootless | past(furthest, free.mean(axis=0))
         parts.append(table.assign(contraction=np.nan))
     return pd.concat(parts, ignore_index=True)[COLUMNS]
+
+
+def _furthest(
+    reach: Reach, model: Model, draws: Draws, pressures: Array, free: Array, grid: Array, seed: int
+) -> Array:
+    """Largest contraction (pressures,) that readings reach; ``free`` (N, pressures) as predicted there."""
+    inside = reach.inside(pressures)
+    if not inside.any():
+        return reach.at(pressures)
+    levels = np.unique(np.concatenate(reach.neighbours(pressures[inside])))
+    curves = force_curves(model, draws.thin(REACH_DRAWS), reach.pressures[levels], grid, seed)
+    at_levels = np.full(len(reach.pressures), np.nan)
+    at_levels[levels] = _mean_free(first_root(grid, curves.force[:, :, 2]), grid)
+    return reach.along(pressures, _mean_free(free, grid), at_levels)
+
+
+def _mean_free(free: Array, grid: Array) -> Array:
+    """Mean free contraction (pressures,), nan where there is none.
+
+    A curve that never reaches zero ends at the grid's edge: that is no free contraction.
+    """
+    rootless = np.mean(free >= grid[-1], axis=0) > ROOTLESS
+    return np.where(rootless, np.nan, free.mean(axis=0))
 
 
 @dataclass(frozen=True)

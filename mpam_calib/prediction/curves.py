@@ -132,6 +132,11 @@ def first_root(contractions: Array, force: Array) -> Array:
     return np.where(index == 0, 0.0, np.where(index < 0, contractions[-1], root))
 
 
+def past(furthest: Array, contraction: Array) -> NDArray[np.bool_]:
+    """Whether a contraction lies past the largest recorded one."""
+    return np.asarray(contraction > furthest * (1.0 + PAST) + 1e-3)
+
+
 @dataclass(frozen=True)
 class Reach:
     """Where the data end: pressures (Pa), the largest contraction at each, and the least with a force."""
@@ -147,8 +152,8 @@ class Reach:
         return cls(levels, np.array(blueprint.reach), np.array(blueprint.onset or np.zeros(len(levels))))
 
     def beyond(self, pressure: Array, contraction: Array) -> NDArray[np.bool_]:
-        """Whether a contraction lies past the largest recorded one."""
-        return np.asarray(contraction > self.at(pressure) * (1.0 + PAST) + 1e-3)
+        """Whether a contraction lies past the largest recorded one, interpolated."""
+        return past(self.at(pressure), contraction)
 
     def before(self, pressure: Array, contraction: Array) -> NDArray[np.bool_]:
         """Whether a contraction lies short of the least that a force was recorded at."""
@@ -158,6 +163,31 @@ class Reach:
     def at(self, pressure: Array) -> Array:
         """Largest recorded contraction, interpolated."""
         return np.interp(pressure, self.pressures, self.contraction)
+
+    def along(self, pressure: Array, free: Array, free_at_levels: Array) -> Array:
+        """Largest contraction (n,) that readings reach at pressures (n,), by what is left to the end there.
+
+        Between two levels as large a share of the free contraction as at both of them: that grows less and
+        less with the pressure, so that a straight line between two ends falls short of the ends between.
+        ``free`` (n,) and ``free_at_levels`` (levels,) are free contractions, nan where there is none.
+        """
+        straight = self.at(pressure)
+        if len(self.pressures) < 2:
+            return straight
+        low, high = self.neighbours(pressure)
+        share = self.contraction / np.where(free_at_levels > 0.0, free_at_levels, np.nan)
+        shared = np.minimum(share[low], share[high]) * free
+        return np.where(self.inside(pressure), np.fmax(straight, shared), straight)
+
+    def inside(self, pressure: Array) -> NDArray[np.bool_]:
+        """Whether a pressure lies between two recorded ones, at none of them."""
+        within = (pressure > self.pressures[0]) & (pressure < self.pressures[-1])
+        return np.asarray(within & ~np.isin(pressure, self.pressures))
+
+    def neighbours(self, pressure: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """The levels (n,) below and above pressures (n,), by index."""
+        high = np.clip(np.searchsorted(self.pressures, pressure), 1, len(self.pressures) - 1)
+        return high - 1, high
 
     def outside(self, pressure: Array) -> NDArray[np.bool_]:
         """Whether a pressure lies outside the recorded ones (by more than 1 %)."""

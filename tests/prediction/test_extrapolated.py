@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+import pytest
 from model import build
 
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.model import build_model
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.prediction.bands import muscle_bands
+from mpam_calib.prediction.curves import Reach
 from mpam_calib.specimen.recording import BlockedForce, FreeContraction, Specimen
 
 TOP = 2e5
@@ -25,11 +27,11 @@ def muscle(start_mm: float) -> Specimen:
     return build.with_force(build.specimen(None, moved), np.full(len(moved.time_s), 10.0))
 
 
-def marked(specimen: Specimen) -> pd.DataFrame:
+def marked(specimen: Specimen, pressure: float = TOP) -> pd.DataFrame:
     model = build_model(draw_blueprint(specimen))
     u = np.zeros((4, len(model.names)))
     draws = Draws(u, model.values(u), np.zeros((4, sum(model.linear_sizes))), 1)
-    return muscle_bands(model, draws, np.array([TOP]), 0, trim=False).set_index("quantity")
+    return muscle_bands(model, draws, np.array([pressure]), 0, trim=False).set_index("quantity")
 
 
 def contractions(bands: pd.DataFrame) -> np.ndarray:
@@ -75,3 +77,58 @@ def test_a_free_contraction_further_than_the_loops_went_is_marked_until_it_was_r
     assert 0.4 < found["mean"] < 0.5 and found["extrapolated"]
     read = FreeContraction(**{**FREE, "contraction": np.array([0.4, 0.42, 0.46])})
     assert not marked(replace(made, free_contraction=read)).loc["free_contraction", "extrapolated"]
+
+
+KNOWN = {
+    "moduli": "tensile",
+    "E_Pa": (6.0e5,),
+    "E_rel_sd": 0.1,
+    "order": 1,
+    "law": "constant",
+    "friction": "none",
+}
+ENDS = (100.0, 300.0)
+"""Levels, kPa, between which a muscle of known moduli is asked for."""
+
+
+def free_at(kPa: float) -> float:
+    """The free contraction of the known muscle, whatever was recorded of it."""
+    made = build.with_force(build.specimen(KNOWN, build.loops(ENDS)), np.full(48, 10.0))
+    return float(marked(made, 1e3 * kPa).loc["free_contraction", "mean"])
+
+
+def recorded_to(*shares: float) -> Specimen:
+    """Loops at ENDS that go so far on the way to the free contraction."""
+    rows = 12
+    lengths = [
+        share * free_at(kPa) * 50.0 * rows / (rows - 0.5) for kPa, share in zip(ENDS, shares, strict=True)
+    ]
+    loops = build.loops(ENDS, tuple(lengths), rows)
+    return build.with_force(build.specimen(KNOWN, loops), np.full(48, 10.0))
+
+
+@pytest.mark.parametrize("kPa", [130.0, 150.0, 200.0, 240.0])
+@pytest.mark.parametrize("shares", [(0.98, 0.98), (0.5, 0.5), (0.5, 0.98)])
+def test_between_levels_the_share_of_the_way_to_the_end_is_what_was_recorded(
+    kPa: float, shares: tuple[float, float]
+) -> None:
+    made, free = recorded_to(*shares), free_at(kPa)
+    straight = np.interp(kPa, ENDS, [share * free_at(P) for P, share in zip(ENDS, shares, strict=True)])
+    furthest = max(min(shares) * free, straight)
+    if shares[0] == shares[1]:
+        assert furthest > 1.03 * straight  # the free contraction bends: a straight line falls short
+    bands = marked(made, 1e3 * kPa)
+    seen = contractions(bands)
+    # Some slack of 2 % and 0.001 is allowed beyond what was recorded, and rows are 0.005 apart.
+    assert furthest - 0.005 < seen.max() <= 1.02 * furthest + 0.002
+    assert bool(bands.loc["free_contraction", "extrapolated"]) == (min(shares) < 0.98)
+
+
+def test_without_a_free_contraction_at_both_neighbours_the_reach_is_a_straight_line() -> None:
+    reach = Reach(np.array([1e5, 3e5]), np.array([0.1, 0.2]), np.zeros(2))
+    pressure, known = np.array([1e5, 2e5, 3e5]), np.array([0.12, 0.25, 0.25])
+    assert reach.along(pressure, known, np.array([0.125, 0.25])) == pytest.approx([0.1, 0.2, 0.2])
+    for missing in (np.nan, 0.0):
+        assert reach.along(pressure, known, np.array([missing, 0.25])) == pytest.approx([0.1, 0.15, 0.2])
+    unknown = np.full(3, np.nan)
+    assert reach.along(pressure, unknown, np.array([0.125, 0.25])) == pytest.approx([0.1, 0.15, 0.2])
