@@ -89,7 +89,9 @@ def muscle_bands(
             own = np.stack([each.contraction for each in noise], axis=1)
             contraction = np.maximum(first_root(grid, shifted) + own, 0.0)
         table = _table(f"blocked_force_N{suffix}", pressures, np.zeros(1), "", blocked[:, :, None])
-        parts.append(table.assign(extrapolated=unseen[:, 0]))
+        # Blocked forces may have been read at more pressures than the loops.
+        read = np.zeros(len(pressures), dtype=bool) if recorded is None else recorded.blocked(pressures)
+        parts.append(table.assign(extrapolated=unseen[:, 0] & ~read))
         table = _table(f"free_contraction{suffix}", pressures, np.zeros(1), "", contraction[:, :, None])
         rootless = np.isnan(_mean_free(free, grid))
         table["extrapolated"] = outside | rootless | past(furthest, free.mean(axis=0))

@@ -33,6 +33,8 @@ GRID = np.arange(round(LIMIT / STEP) + 1, dtype=np.float64) * STEP
 PAST, SHORT = 0.02, 0.05
 """Shares of the recorded contraction beyond its ends that are still as recorded: a test begins with some
 slack taken up."""
+OUTSIDE = 0.01
+"""Share of the largest recorded pressure by which a pressure may miss the recorded ones."""
 BEYOND = 1.1
 """Curves are drawn so many times as far as any muscle comes."""
 
@@ -202,4 +204,4 @@ class Reach:
     @property
     def _margin(self) -> float:
         """Pressure (Pa) by which a gauge's reading may miss its level."""
-        return 0.01 * float(self.pressures[-1])
+        return OUTSIDE * float(self.pressures[-1])

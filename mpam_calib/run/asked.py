@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.model import Model
 from mpam_calib.prediction.curves import Reach, contraction_grid
+from mpam_calib.prediction.recorded import Recorded
 from mpam_calib.report.held import Held, held_left_out
 from mpam_calib.units import KPA
 
@@ -18,6 +19,9 @@ Array = NDArray[np.float64]
 LEFT_OUT = "left_out"
 """The key of ``run.json`` that keeps what became of each level that was left out."""
 KEPT = ("pressure_kPa", "readings", "inside90", "extrapolated")
+EVERYTHING = ": these numbers are extrapolated"
+BUT_BLOCKED = " of all but the blocked force, which alone is not extrapolated there"
+"""What ends a line on pressures beyond the levels, by what was recorded at them."""
 SHOWN = 4
 """Pressures that a line names."""
 
@@ -43,9 +47,13 @@ def remarks(model: Model, state: dict[str, Any], pressures_kPa: Array, table: pd
     reach = Reach.of(model.blueprint)
     outside, between = reach.outside(pressures_kPa * KPA), reach.between(pressures_kPa * KPA)
     rows = pd.DataFrame(state.get(LEFT_OUT) or [], columns=list(KEPT))
+    recorded = Recorded.kept(state)
+    blocked = np.zeros_like(outside) if recorded is None else recorded.blocked(pressures_kPa * KPA)
+    levels, held = reach.pressures / KPA, held_left_out(rows, extrapolated=True)
     lines = [
         _between(pressures_kPa[between], held_left_out(rows, extrapolated=False)),
-        _beyond(pressures_kPa[outside], reach.pressures / KPA, held_left_out(rows, extrapolated=True)),
+        _beyond(pressures_kPa[outside & ~blocked], levels, held),
+        _beyond(pressures_kPa[outside & blocked], levels, held, BUT_BLOCKED),
         _cut(float(contraction_grid(model, float(reach.contraction.max()))[-1]), table),
     ]
     return [line for line in lines if line]
@@ -60,11 +68,11 @@ def _between(pressures: Array, held: Held | None) -> str:
     return f"{where}: at a level that the fit had not seen, {held} of readings fell in bands meant for 90 %"
 
 
-def _beyond(pressures: Array, levels: Array, held: Held | None) -> str:
+def _beyond(pressures: Array, levels: Array, held: Held | None, which: str = EVERYTHING) -> str:
     if not len(pressures):
         return ""
     recorded = f"{levels[0]:.4g}" + (f" to {levels[-1]:.4g}" if len(levels) > 1 else "")
-    line = f"{_listed(pressures)} beyond the recorded {recorded} kPa: these numbers are extrapolated"
+    line = f"{_listed(pressures)} beyond the recorded {recorded} kPa{which}"
     if held is None:
         return line
     return (

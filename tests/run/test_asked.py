@@ -11,6 +11,7 @@ import pytest
 
 from mpam_calib.posterior.stored import StoredRun, load_run
 from mpam_calib.prediction.curves import contraction_grid
+from mpam_calib.prediction.recorded import RECORDED, Recorded
 from mpam_calib.run.asked import KEPT, kept_left_out, remarks
 
 from .command import Here
@@ -55,6 +56,20 @@ def test_beyond_levels_it_is_told_always(stored: StoredRun) -> None:
     assert "90 % of readings fell in bands meant for 90 %" in line
     (line,) = said(stored, 250.0, inner=None)
     assert line.endswith("250 kPa lies beyond the recorded 100 to 200 kPa: these numbers are extrapolated")
+
+
+def test_blocked_forces_that_were_recorded_beyond_the_levels_are_left_out(stored: StoredRun) -> None:
+    blocked = {RECORDED: Recorded(frozenset({"loading"}), (10.0, 260.0)).as_json()}
+    few, many = remarks(stored.model, blocked, np.array([50.0, 150.0, 250.0, 300.0]), NOTHING)[:2]
+    assert few == "300 kPa lies beyond the recorded 100 to 200 kPa: these numbers are extrapolated"
+    assert many == (
+        "50, 250 kPa lie beyond the recorded 100 to 200 kPa of all but the blocked force, which alone is not "
+        "extrapolated there"
+    )
+
+
+def test_the_run_keeps_what_was_recorded(stored: StoredRun) -> None:
+    assert Recorded.kept(stored.state) == Recorded(frozenset({"loading", "unloading"}), None)
 
 
 def test_many_pressures_are_counted(stored: StoredRun) -> None:
