@@ -31,8 +31,9 @@ THESIS_FRICTION = {"K_f": 0.0787, "f_s": 0.15}
 THESIS_FORCE_SD = 0.25
 """N; 0.1 % of the thesis's 250 N load cell."""
 AS_DECLARED = Options(remainder=False, nuisances=False)
-"""What is simulated is the declared simulation: what is uncertain in it stays as declared."""
-WITH_REMAINDER = Options(nuisances=False)
+"""What is simulated is the declared simulation: what is uncertain in it is as declared."""
+FITTED = Options(remainder=False)
+"""What is fitted for it: an offset that the gauge is declared to have is not to end in the moduli."""
 NOISES = (WHITE, CORRELATED, TIME, GROWTH, FREEDOM)
 NOT_PUT_IN = (NOISE, CONTRACTION_SD)
 """Noise of files that are not simulated."""
@@ -58,8 +59,9 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
     With data: the mode fitted to them, at their rows. Without: the declared ``E_Pa`` and the thesis's
     protocol. ``hide`` maps effects (``id``, or ``id:form`` for another author's equation, whose own
     parameters are typical) to a size in lab units (None: a typical one). Uncertain geometry and a gauge's
-    offset stay as declared. Raises ``InputError`` for an effect that is unknown, is part of the simulation,
-    has no size to hide or lacks what it needs, and for a size that its prior all but rules out.
+    offset are fitted like all else, and the synthetic muscle and gauge are the declared ones. Raises
+    ``InputError`` for an effect that is unknown, is part of the simulation, has no size to hide or lacks
+    what it needs, and for a size that its prior all but rules out.
     """
     demand_specimen(specimen)
     demand_whole("--seed", seed, 0)
@@ -80,9 +82,10 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
         )
     if fitted:
         blueprint = draw_blueprint(specimen, AS_DECLARED, material_of(specimen))
-        values, eta = _mode(specimen, blueprint, rng)
+        values, eta = _mode(specimen, blueprint.model_copy(update={"options": FITTED}), rng)
+        values = {name: values[name] for name in build_model(blueprint).names}
         # What the declared simulation misses is no noise: that is told beside a remainder.
-        beside, _ = _mode(specimen, blueprint.model_copy(update={"options": WITH_REMAINDER}), rng)
+        beside, _ = _mode(specimen, blueprint.model_copy(update={"options": Options()}), rng)
         values |= {name: beside[name] for name in NOISES if name in beside}
     else:
         specimen = _tested(replace(specimen, levels_Pa=LEVELS))

@@ -59,6 +59,32 @@ def test_what_is_uncertain_stays_as_declared(
     assert np.sqrt(np.mean(missed**2)) == pytest.approx(noise, rel=0.15)
 
 
+KNOWN_E_PA = 8.5e4
+
+
+def test_an_offset_that_was_declared_possible_does_not_end_in_the_declared_moduli(tmp_path: Path) -> None:
+    """A gauge that reads 15 kPa too much, declared to 22.5 kPa; moduli that are right, declared to 10 %."""
+    text = loops_text(rows=40, moduli=((0.0, KNOWN_E_PA),))
+    header, *rows = text.splitlines()
+    cells = [row.split(",") for row in rows]
+    text = "\n".join([header, *(f"{t},{float(P) + 15.0:.6g},{x},{F}" for t, P, x, F in cells)]) + "\n"
+    tensile = f'moduli = "tensile"\nE_Pa = [{KNOWN_E_PA}]\nE_rel_sd = 0.1\n'
+    simulation = f'[simulation]\n{tensile}friction = "coulomb"\n'
+    sensors = "[sensors]\npressure_bias_sd_kPa = 22.5\n"
+    made = simulate(read(Specimen(simulation=simulation, tables=sensors).write(tmp_path / "own", loops=text)))
+    put = made.parameters
+    assert abs(put["E_1"] / KNOWN_E_PA - 1.0) < 0.05
+    assert "pressure_bias_kPa" not in put
+    # The gauge of the synthetic rig has the declared offset of zero: its readings are the pressures.
+    loops = made.specimen.loops
+    assert loops is not None
+    pressure, contraction = loops.pressure_Pa / 1e3, loops.displacement_m / 0.05
+    free = static_force(pressure, contraction, ((0.0, put["E_1"]),))
+    missed = loops.force_N - free - put["K_f"] * np.abs(free) * loops.branch
+    assert np.std(missed) == pytest.approx(np.hypot(put["noise_sd_N"], put["noise_corr_sd_N"]), rel=0.15)
+    assert abs(np.mean(missed)) < 0.05
+
+
 def test_the_mode_is_that_of_the_declared_simulation_and_the_noise_that_of_the_sensor(tmp_path: Path) -> None:
     """One modulus for all pressures cannot follow the muscle: it comes as near as least squares do."""
     simulation = SIMULATION.replace("order = 2", "order = 1").replace("linear", "constant")
