@@ -20,7 +20,7 @@ _IN: Final[dict[str, dict[str, float]]] = {
     "kPa": {"kpa": 1.0, "pa": 1e-3, "hpa": 0.1, "mbar": 0.1, "mpa": 1e3, "bar": 100.0, "psi": 6.894757},
     "mm": {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "cm": 10.0, "m": 1e3, "in": 25.4, "inch": 25.4},
     "N": {"n": 1.0, "mn": 1e-3, "g": 9.80665e-3, "kg": 9.80665, "kgf": 9.80665, "lbf": 4.448222, "kn": 1e3},
-    "Pa": {"pa": 1.0, "kpa": 1e3, "mpa": 1e6},
+    "Pa": {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/mm²": 1e6, "n/mm2": 1e6, "n/mm^2": 1e6, "psi": 6894.757},
     "C": {"°c": 1.0, "c": 1.0, "degc": 1.0},
 }
 """What one unit is worth in that of a column's name, by its spelling in lower case."""

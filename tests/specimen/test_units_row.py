@@ -113,7 +113,7 @@ def test_units_of_what_a_map_makes_another_quantity_of(tmp_path: Path, units: st
             "force_N",
             {"mN": 1e-3, "kN": 1000.0, "g": 9.80665e-3, "kg": 9.80665, "kgf": 9.80665, "lbf": 4.4482},
         ),
-        ("stress_Pa", {"kPa": 1e3, "MPa": 1e6}),
+        ("stress_Pa", {"kPa": 1e3, "MPa": 1e6, "N/mm²": 1e6, "N/mm^2": 1e6, "psi": 6894.76}),
         ("contraction", {"%": 0.01, "-": 1.0, "mm/mm": 1.0}),
         ("strain", {"%": 0.01, "": 1.0}),
     ],
