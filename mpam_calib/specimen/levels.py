@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from mpam_calib.specimen.close_levels import part_close
 from mpam_calib.specimen.motion import run_ids, run_starts
 from mpam_calib.specimen.recording import (
     DEPRESSURISING,
@@ -28,13 +29,17 @@ ON_THE_WAY = 0.1
 """Share of all its changes that a commanded setpoint may make between them; one read back makes most."""
 LEAST_RUN = 5
 """Fewer rows than this far from their stroke's level are noise, not a change of level."""
+INNER, ALONG = (0.05, 0.95), (0.1, 0.9)
+"""Quantiles between which a stroke's pressure counts: all but glitches, and all but its holds."""
 SMALLEST_GAP_PA = 0.3 * KPA
 SETPOINT_SHARE = 0.2
 """A level's readings may differ from its setpoint by this share of it."""
 STATIC_GAPS = (0.01, 0.02)
 """Gaps between static levels, as shares of the largest reading: never below, surely above."""
 STROKE_GAPS = (0.025, 0.04)
-"""The same for strokes: a regulator lags, so the two branches of one level differ by a few percent."""
+"""The same for strokes: a regulator lags, so the two branches of one level differ by a few percent ..."""
+LAG = 0.1
+"""... and by less than this share."""
 
 
 def gap_clusters(values: Floats, shares: tuple[float, float], spread: float = 0.0) -> Ints:
@@ -74,13 +79,14 @@ def static_levels(pressure: Floats) -> Ints:
 
 
 def stroke_levels(
-    pressure: Floats, units: Ints, steady: Bools, gaps: tuple[float, float] = STROKE_GAPS, least: int = 1
+    pressure: Floats, units: Ints, branch: Ints, gaps: tuple[float, float] = STROKE_GAPS, least: int = 1
 ) -> Ints:
     """Levels of loops recorded in time, shape (rows,), from 0 upwards.
 
-    ``pressure`` in Pa; ``units`` numbers the strokes (contiguous runs, from 0); ``steady`` is false
-    for rows whose pressure is being changed on purpose (pressurising, depressurising). The strokes'
-    medians, those of ``least`` rows or more, are clustered (``gaps`` as in :func:`gap_clusters`); then runs
+    ``pressure`` in Pa; ``units`` numbers the strokes (contiguous runs, from 0), ``branch`` their directions:
+    the pressure of some is being changed on purpose (pressurising, depressurising). The others'
+    medians, those of ``least`` rows or more, are clustered (``gaps`` as in :func:`gap_clusters`, and finer as
+    in :func:`part_close`); then runs
     of rows that are clearly at another level (a change of pressure during a hold) are moved there. Where
     nothing but the pressure parts two strokes (each way back was left out), it does.
     """
@@ -90,22 +96,46 @@ def stroke_levels(
     medians = np.array([np.median(piece) for piece in pieces])
     scatter = np.array([np.median(np.abs(piece - m)) for piece, m in zip(pieces, medians, strict=True)])
     sizes = np.array([len(piece) for piece in pieces])
-    counts = steady[starts] & (sizes >= max(least, 0.05 * np.median(sizes)))
+    steady = ~np.isin(branch[starts], [PRESSURISING, DEPRESSURISING])
+    counts = steady & (sizes >= max(least, 0.05 * np.median(sizes)))
     if not counts.any():
         return static_levels(pressure)
-    label = gap_clusters(medians[counts], gaps, 1.4826 * float(np.median(scatter[counts])))
-    centres = np.array([np.median(medians[counts][label == i]) for i in range(label.max() + 1)])
+    spread = 1.4826 * float(np.median(scatter[counts]))
+    widths = np.array([np.ptp(np.quantile(piece, ALONG)) for piece in pieces])
+    ways = branch[starts][counts]
+    even = _without_lag(medians[counts], ways)
+    label = part_close(even, widths[counts], ways, gap_clusters(even, gaps, spread), spread)
+    centres = medians_by_label(even, label)
     own = np.empty(len(starts), dtype=np.int64)
     own[counts] = label
     own[~counts] = _nearest(medians[~counts], centres)
-    return _moved(pressure, own[units], centres)
+    off = np.zeros(len(starts))
+    off[counts] = medians[counts] - centres[label]
+    return _moved(pressure - off[units], own[units], centres)
+
+
+def _without_lag(medians: Floats, branch: Ints) -> Floats:
+    """Strokes' pressures (strokes,) in time order without the share by which their two directions differ.
+
+    A regulator lags, so the pressure is always higher one way. Of a cycle's two turns one may be a change of
+    level, so the lesser difference counts.
+    """
+    found = [LAG]
+    for way in (LOADING, UNLOADING):
+        here = np.flatnonzero((branch[:-1] == way) & (branch[1:] == -way))
+        if len(here):
+            before, after = medians[here], medians[here + 1]
+            middle = np.maximum(0.5 * np.abs(before + after), SMALLEST_GAP_PA)
+            found.append(float(np.median((before - after) / middle)) * way)
+    lag = min(found, key=abs)
+    return medians * (1.0 - 0.5 * lag * np.sign(branch)) if abs(lag) < LAG else medians
 
 
 def _cut_where_wide(pressure: Floats, units: Ints, gaps: tuple[float, float]) -> Ints:
     """The strokes, those that go over several levels in pieces."""
     starts = run_starts(units)
     pieces = np.split(pressure, starts[1:])
-    spread = np.array([np.ptp(np.quantile(piece, (0.05, 0.95))) for piece in pieces])
+    spread = np.array([np.ptp(np.quantile(piece, INNER)) for piece in pieces])
     wide = spread > gaps[1] * np.abs(pressure).max()
     if not wide.any():
         return units
@@ -138,8 +168,7 @@ def setpoint_levels(setpoint: Floats, displacement: Floats, branch: Ints, units:
         on_the_way = changed & _under_way(displacement, branch, units)
         if far_apart or np.count_nonzero(on_the_way) <= ON_THE_WAY * np.count_nonzero(changed):
             return exact
-    steady = ~np.isin(branch, [PRESSURISING, DEPRESSURISING])
-    return stroke_levels(setpoint, units, steady, STATIC_GAPS, STEADY)
+    return stroke_levels(setpoint, units, branch, STATIC_GAPS, STEADY)
 
 
 def _ramped(values: Ints) -> bool:

@@ -206,8 +206,7 @@ def _levels_and_motion(frames: Sequence[pd.DataFrame], clock: Ints, setpoints: b
     if setpoints:
         level = setpoint_levels(column("setpoint_kPa") * KPA, column("displacement_mm"), rough, units)
     else:
-        steady = ~np.isin(rough, [PRESSURISING, DEPRESSURISING])
-        level = stroke_levels(column("pressure_kPa") * KPA, units, steady)
+        level = stroke_levels(column("pressure_kPa") * KPA, units, rough)
     parts = zip(frames, np.split(level, _ends(frames)), strict=True)
     return level, _joined([_motion(frame, run_ids(part)) for frame, part in parts])
 
