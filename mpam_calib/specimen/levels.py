@@ -97,7 +97,9 @@ def stroke_levels(
     scatter = np.array([np.median(np.abs(piece - m)) for piece, m in zip(pieces, medians, strict=True)])
     sizes = np.array([len(piece) for piece in pieces])
     steady = ~np.isin(branch[starts], [PRESSURISING, DEPRESSURISING])
-    counts = steady & (sizes >= max(least, 0.05 * np.median(sizes)))
+    if not steady.any():
+        return static_levels(pressure)
+    counts = steady & (sizes >= max(least, 0.05 * np.median(sizes[steady])))
     if not counts.any():
         return static_levels(pressure)
     spread = 1.4826 * float(np.median(scatter[counts]))
@@ -195,12 +197,20 @@ def same_level(pressure: Floats, level: Floats) -> Bools:
     return np.asarray(np.abs(pressure - level) <= tolerance)
 
 
-def sorted_levels(pressure: Floats, level: Ints) -> tuple[Ints, Floats]:
-    """Levels numbered by rising median pressure, and these medians (Pa); those that read alike are one."""
+def sorted_levels(pressure: Floats, level: Ints, filled: Bools) -> tuple[Ints, Floats]:
+    """Levels numbered by rising median pressure, and these medians (Pa); those that read alike are one.
+
+    Rows at which the muscle was being ``filled`` (rows,) count where a level has no others.
+    """
     found = np.unique(level, return_inverse=True)[1].astype(np.int64)
-    place = np.unique(np.round(medians_by_label(pressure, found), 3), return_inverse=True)[1]
+    counts = ~filled | ~np.isin(found, found[~filled])
+
+    def medians(label: Ints) -> Floats:
+        return medians_by_label(pressure[counts], label[counts])
+
+    place = np.unique(np.round(medians(found), 3), return_inverse=True)[1]
     level = place[found].astype(np.int64)
-    return level, medians_by_label(pressure, level)
+    return level, medians(level)
 
 
 def merge_levels(loops_Pa: Floats, map_Pa: Floats) -> tuple[Floats, Ints, Ints]:

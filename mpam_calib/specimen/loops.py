@@ -12,6 +12,7 @@ import pandas as pd
 from mpam_calib.specimen.clock import Clock
 from mpam_calib.specimen.cycles import cycles_at_turns, number_cycles, returns
 from mpam_calib.specimen.declaration import Geometry
+from mpam_calib.specimen.filling import filled_rows, held_rows
 from mpam_calib.specimen.held_length import check_held_length
 from mpam_calib.specimen.levels import setpoint_levels, setpoint_notes, sorted_levels, stroke_levels
 from mpam_calib.specimen.motion import (
@@ -78,11 +79,17 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
         without = [file.label for file, frame in zip(files, frames, strict=True) if name not in frame]
         if without and len(without) < len(files):
             notes.append(f"loops: {name} is not in {listed(without, 3)} and was not used in the others")
-    level, (branch, unclear) = _levels_and_motion(frames, clock, "setpoint_kPa" in everywhere)
-    if unclear.any():
+    level, (branch, unclear), filled = _levels_and_motion(frames, clock, "setpoint_kPa" in everywhere)
+    turning = unclear & ~filled
+    if turning.any():
         notes.append(
-            f"loops: {int(unclear.sum())} readings at turns and beside holds are left out: their "
+            f"loops: {int(turning.sum())} readings at turns and beside holds are left out: their "
             "displacement does not tell the branch (a column branch would)"
+        )
+    if filled.any():
+        notes.append(
+            f"loops: {int(filled.sum())} readings at held length are left out: their pressure is on its way, "
+            "or already another than their stroke's (a column branch would tell what they are)"
         )
     times = [frame["time_s"].to_numpy() for frame in frames]
     anew = sum(bool(after[0] <= before[-1]) for before, after in pairwise(times))
@@ -94,7 +101,7 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
     rows = pd.concat([frame[sorted(everywhere)] for frame in frames], ignore_index=True)
     pressure = rows["pressure_kPa"].to_numpy() * KPA
     apart = len(np.unique(level))
-    level, levels_Pa = sorted_levels(pressure, level)
+    level, levels_Pa = sorted_levels(pressure, level, filled)
     if len(levels_Pa) < apart:
         notes.append(f"loops: {apart} setpoints are {len(levels_Pa)} levels, for some read the same pressure")
     _check_levels(files, frames, clock, level, levels_Pa)
@@ -191,8 +198,10 @@ def _check_plausible(file: DataFile, frame: pd.DataFrame, geometry: Geometry) ->
         check_branch(file.label, branch, displacement * MM, rows)
 
 
-def _levels_and_motion(frames: Sequence[pd.DataFrame], clock: Ints, setpoints: bool) -> tuple[Ints, Motion]:
-    """Level (in any order) and motion of every row.
+def _levels_and_motion(
+    frames: Sequence[pd.DataFrame], clock: Ints, setpoints: bool
+) -> tuple[Ints, Motion, Bools]:
+    """Level (in any order) and motion of every row, and whether the muscle was then filled or vented.
 
     Strokes tell the levels, and a level's own rows tell its strokes: a jump of the crosshead
     between two levels is no stroke. So the motion is looked at twice.
@@ -201,14 +210,34 @@ def _levels_and_motion(frames: Sequence[pd.DataFrame], clock: Ints, setpoints: b
     def column(name: str) -> Floats:
         return np.concatenate([frame[name].to_numpy() for frame in frames])
 
-    rough = _joined([_motion(frame, np.zeros(len(frame), dtype=np.int64)) for frame in frames]).branch
-    units = run_ids(clock, rough)
+    rough = [_motion(frame, np.zeros(len(frame), dtype=np.int64)).branch for frame in frames]
+    branch = np.concatenate(rough)
+    units = run_ids(clock, branch)
     if setpoints:
-        level = setpoint_levels(column("setpoint_kPa") * KPA, column("displacement_mm"), rough, units)
+        level = setpoint_levels(column("setpoint_kPa") * KPA, column("displacement_mm"), branch, units)
     else:
-        level = stroke_levels(column("pressure_kPa") * KPA, units, rough)
-    parts = zip(frames, np.split(level, _ends(frames)), strict=True)
-    return level, _joined([_motion(frame, run_ids(part)) for frame, part in parts])
+        # At held length the pressure may be on its way to the next level.
+        held = np.concatenate([_held(*pair) for pair in zip(frames, rough, strict=True)])
+        units = run_ids(clock, branch, held.astype(np.int64))
+        level = stroke_levels(column("pressure_kPa") * KPA, units, np.where(held, PRESSURISING, branch))
+    parts = list(zip(frames, rough, np.split(level, _ends(frames)), strict=True))
+    motion = _joined([_motion(frame, run_ids(part)) for frame, _, part in parts])
+    filled = np.concatenate([_filled(*part) for part in parts])
+    return level, motion._replace(unclear=motion.unclear | filled), filled
+
+
+def _held(frame: pd.DataFrame, branch: Ints) -> Bools:
+    """Rows (rows,) at held length that are not at their stroke's level, where motion tells the branch."""
+    if "branch" in frame:
+        return np.zeros(len(frame), dtype=bool)
+    return held_rows(frame["displacement_mm"].to_numpy(), frame["pressure_kPa"].to_numpy(), branch)
+
+
+def _filled(frame: pd.DataFrame, branch: Ints, level: Ints) -> Bools:
+    """Rows (rows,) at held length at another pressure than their stroke's, where no column says so."""
+    if "branch" in frame:
+        return np.zeros(len(frame), dtype=bool)
+    return filled_rows(frame["displacement_mm"].to_numpy(), frame["pressure_kPa"].to_numpy(), branch, level)
 
 
 def _ends(frames: Sequence[pd.DataFrame]) -> Ints:
