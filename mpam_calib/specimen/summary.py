@@ -60,7 +60,7 @@ def summarise_loops(loops: Loops, levels_Pa: Floats, L0: float) -> LoopsSummary:
                 rows=int(rows.sum()) * loops.averaged,
                 cycles=len(np.unique(loops.cycle[rows])),
                 branches=tuple(BRANCH_NAMES[int(code)] for code in np.unique(loops.branch[rows])[::-1]),
-                speeds_mm_per_min=distinct(speeds[here & (loops.branch[starts] != 0)]),
+                speeds_mm_per_min=distinct(speeds[here & (np.abs(loops.branch[starts]) == 1)]),
                 contraction=(float(contraction.min()), float(contraction.max())),
                 force_N=(float(force.min()), float(force.max())),
             )
