@@ -130,8 +130,8 @@ def _at_a_standstill(loops: Loops) -> list[str]:
     first, rows = start[one], end[one] - start[one]
     return [
         f"loops: the force stands at {loops.force_N[first]:.5g} N for {rows} readings from "
-        f"{loops.time_s[first]:.6g} s, while the muscle moves by {way[one] / MM:.3g} mm, and then jumps by "
-        f"{jump[one]:.3g} N; did the load cell or its logger hang?"
+        f"{loops.time_s[first]:.6g} s after the first one on, while the muscle moves by "
+        f"{way[one] / MM:.3g} mm, and then jumps by {jump[one]:.3g} N; did the load cell or its logger hang?"
     ]
 
 

@@ -95,7 +95,7 @@ def _odd_times(loops: Loops) -> list[str]:
             many = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps"
             remarks.append(
                 f"loops: {many} in the time of file {clock + 1} within a level, "
-                f"the longest {steps[longest]:.3g} s after {time[longest]:.6g} s"
+                f"the longest {steps[longest]:.3g} s, {time[longest]:.6g} s after the first reading"
             )
     return remarks
 
@@ -272,7 +272,7 @@ def _stray_forces(name: str, specimen: Specimen, force: Floats) -> list[str]:
         return []
     row = int(np.abs(force).argmax())
     loops = specimen.loops if name == "loops" else None
-    when = "" if loops is None else f" at {loops.time_s[row]:.6g} s"
+    when = "" if loops is None else f", {loops.time_s[row]:.6g} s after the first reading"
     many = "a force is" if stray == 1 else f"{stray} forces are"
     return [f"{name}: {many} far from all others ({force[row]:.4g} N{when})"]
 

@@ -78,7 +78,9 @@ def test_nothing_is_odd_in_a_plain_test(tmp_path: Path) -> None:
         pytest.param(times(3, 1e3), "while the gas alone pulls about", id="millinewtons"),
         pytest.param(times(1, 10.0), "while the gas alone pulls about", id="millibars"),
         pytest.param(times(3, 0.101972), "while the gas alone pulls about", id="kilograms-force"),
-        pytest.param(blip, "a force is far from all others (-8000 N at 0.7 s)", id="a knock"),
+        pytest.param(
+            blip, "a force is far from all others (-8000 N, 0.7 s after the first reading)", id="a knock"
+        ),
         pytest.param(one_level_in_bar, "N at 1 kPa, where the gas pulls about", id="one level in bar"),
         pytest.param(offset(3, -16.0), "every force at 50 kPa is below zero; was the load", id="zero"),
         pytest.param(from_the_other_end, "the force grows with the contraction at 3 of 3", id="reversed"),
@@ -263,7 +265,9 @@ def test_a_pause_within_a_level_is_said(said: bool, tmp_path: Path) -> None:
             cells[0] = f"{float(cells[0]) + 5.0:.8g}"
 
     found = remarks(tmp_path, pause)
-    words = "loops: a gap in the time of file 1 within a level, the longest 5.1 s after 1.9 s"
+    words = (
+        "loops: a gap in the time of file 1 within a level, the longest 5.1 s, 1.9 s after the first reading"
+    )
     assert (words in found, "a gap" in found) == (said, said)
 
 
