@@ -8,6 +8,7 @@ distribution, or have tails that fall away gradually; it would only make the noi
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -23,9 +24,8 @@ FEWEST, READINGS_EACH, DEGREE = 10, 8, 6
 """Readings of a stroke that is looked at, those to each degree of the curve taken out of it, most degrees."""
 TURNS = 0.05
 """Share of a stroke next to each turn that is not looked at."""
-WIDTHS, AS_LONG = (1, 3, 6), 5
-"""Consecutive readings that are looked at together, and how many times as long a stroke then is at least: of
-a shorter one the curve that is taken out has most of their mean, but for those at its ends."""
+WIDTHS = (1, 3, 6)
+"""Consecutive readings that are looked at together."""
 OUTSTANDING = 6.0
 """Standard deviations of such means beyond which readings are no noise: one in 5·10⁸."""
 HALF_WAY, FEWER = 3.0, 3.0
@@ -50,17 +50,13 @@ def bursts_rms(rows: Rows, residual: Array, sd: Array) -> float:
     # What other strokes have at the same place, too, is no burst, however sharp.
     own = [piece - usual for alike in groups for piece, usual in zip(alike, _of_others(alike), strict=True)]
     stand_out = np.zeros(len(every), dtype=bool)
-    length = np.concatenate([np.full(len(piece), len(piece)) for piece in left])
     for width in WIDTHS:
-        told = length >= AS_LONG * width
-        if not told.any():
-            continue
         most = np.inf if width == 1 else OUTSTANDING * SD * float(np.median(np.abs(every)))
         here, beside = (np.concatenate([_mean(piece, width, most) for piece in kind]) for kind in (left, own))
         if width == 1 and _tails(here):
             continue
-        least = OUTSTANDING * SD * np.median(np.abs(here[told]))
-        high = told & (np.abs(here) > least) & (np.abs(beside) > least) & (here * beside > 0.0)
+        least = OUTSTANDING * SD * np.median(np.abs(here))
+        high = (np.abs(here) > least) & (np.abs(beside) > least) & (here * beside > 0.0)
         stand_out |= ndimage.maximum_filter1d(high, width)
     share = float(np.sqrt(np.mean(np.where(stand_out, every, 0.0) ** 2)))
     noise = SD * float(np.median(np.abs(every)))
@@ -79,8 +75,28 @@ def _tails(every: Array) -> bool:
 
 def _mean(piece: Array, width: int, most: float) -> Array:
     """Means over some consecutive readings, of which none counts for more than the ``most``: it would be a
-    burst by itself."""
-    return np.asarray(ndimage.uniform_filter1d(np.clip(piece, -most, most), width, mode="constant"))
+    burst by itself. They are told in what white noise scatters there."""
+    means = ndimage.uniform_filter1d(np.clip(piece, -most, most), width, mode="constant")
+    return np.asarray(means / _scatter(len(piece), width))
+
+
+@lru_cache(maxsize=1024)
+def _scatter(n: int, width: int) -> Array:
+    """Sds (n,) of means over so many readings of a detrended stroke, for white noise of sd 1.
+
+    Of a short stroke the curve that is taken out has most of these means but for those at its ends. Nowhere
+    less than their median: next to its turns a force may be fast itself.
+    """
+    axes, _ = np.linalg.qr(_curve(n))
+    seen = ndimage.uniform_filter1d(np.ones(n), width, mode="constant") / width
+    taken = ndimage.uniform_filter1d(axes, width, axis=0, mode="constant")
+    sd = np.sqrt(np.maximum(seen - np.sum(taken**2, axis=1), 0.0))
+    return np.asarray(np.maximum(sd, np.median(sd)))
+
+
+def _curve(n: int) -> Array:
+    """The smooth functions (n, degree + 1) that are taken out of a stroke of n readings."""
+    return np.asarray(legendre.legvander(np.linspace(-1.0, 1.0, n), min(DEGREE, n // READINGS_EACH)))
 
 
 def _strokes(rows: Rows, residual: Array) -> list[list[Array]]:
@@ -106,8 +122,7 @@ def detrended(rows: Rows, residual: Array) -> Iterator[tuple[slice, Array]]:
         here = slice(max(start + margin, int(moving[0])), min(stop - margin, int(moving[-1]) + 1))
         piece = residual[here]
         if len(piece) >= FEWEST:
-            degree = min(DEGREE, len(piece) // READINGS_EACH)
-            columns = legendre.legvander(np.linspace(-1.0, 1.0, len(piece)), degree)
+            columns = _curve(len(piece))
             yield here, piece - columns @ np.linalg.lstsq(columns, piece, rcond=None)[0]
 
 

@@ -14,9 +14,11 @@ Array = NDArray[np.float64]
 
 TENSILE_POINTS = 400
 """Rows that are taken as they are; more are grouped, two points a group."""
-DEGREE, ROWS_EACH = 12, 4
+DEGREE, ROWS_EACH = 12, 2
 """Of the polynomial whose residuals show how alike neighbouring rows are, as high as a remainder goes; and
 rows for each degree."""
+QUIET = 1e-4
+"""Share of the stress below which nothing but rounding, or a curve that was computed, is left of it."""
 FEWEST = 6
 """Readings that a test is worth at least, however alike its rows are."""
 
@@ -104,7 +106,7 @@ def _alike(points: TensilePoints, strain: Array, stress: Array) -> float:
     n = len(left)
     padded = fft.next_fast_len(2 * n, real=True)
     covariance = fft.irfft(np.abs(fft.rfft(left, n=padded)) ** 2, n=padded)[:n]
-    if covariance[0] <= 0.0:
+    if np.sum(left**2) <= QUIET**2 * np.sum(stress**2):
         return 1.0
     pairs = (covariance[: n - n % 2].reshape(-1, 2) / covariance[0]).sum(axis=1)
     kept = int(np.argmax(pairs <= 0.0)) if (pairs <= 0.0).any() else len(pairs)
