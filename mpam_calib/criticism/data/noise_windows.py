@@ -24,9 +24,8 @@ WINDOW, LONG_WINDOW, DEGREE = 32, 48, 3
 """Windows of at most so many rows, of one stroke or of two, detrended by a polynomial of this degree ..."""
 SHORT_DEGREE = 5
 """... or of this one, where a stroke is so short that it is one window."""
-USUAL, SELDOM = 4.0, 1e-3
-"""Multiple of the typical power above which a window holds more than noise, where white noise alone exceeds
-it less often than this; few readings scatter more."""
+USUAL = 4.0
+"""Multiple of the typical power above which a window holds more than noise."""
 FEWEST_TELL = 40
 """Contrasts of short strokes that are enough to tell their noise from."""
 CURVE_DEGREE, CURVE_ROWS = 12, 8
@@ -59,9 +58,8 @@ class Windows(NamedTuple):
         """
         if grows:
             return self.take(usual_chunks(self.chunks, self.force))
-        power, dof = np.mean(self.chunks**2, axis=1), self.chunks.shape[1]
-        chance = stats.chi2.isf(SELDOM, dof) / stats.chi2.median(dof)
-        return self.take(power <= max(USUAL, chance) * np.median(power))
+        power = np.mean(self.chunks**2, axis=1)
+        return self.take(power <= USUAL * np.median(power))
 
     def paces(self) -> list[Windows]:
         """The windows parted by their time steps, which strokes at two speeds may have one each of."""
