@@ -21,11 +21,11 @@ from rig import case as rig_case
 from rig import recipes, sets
 from rig.oracle import Oracle
 
+from criticism.found import search
 from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.fitting.folds import folds_of
 from mpam_calib.criticism.gain import measure_gain
 from mpam_calib.criticism.searching.candidates import HISTORY, candidates
-from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.searching.usual_braid import with_strands
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError

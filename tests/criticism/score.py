@@ -23,9 +23,9 @@ from rig import case as rig_case
 from rig import margins, recipes, sets
 from rig.effects import form as rig_form
 
+from criticism.found import search
 from mpam_calib.criticism.data.problem import build_problem
 from mpam_calib.criticism.searching.candidates import candidates
-from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.searching.usual_braid import with_strands
 from mpam_calib.criticism.sizes import DRAWS, sizes_of

@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
+from criticism.found import search
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.data.rows import Rows
 from mpam_calib.criticism.fitting.fit import fit
-from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.unexplained.faults import faults_of
 from mpam_calib.criticism.unexplained.hum import hum_rms
 from mpam_calib.criticism.verdict import judge

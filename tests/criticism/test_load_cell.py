@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from criticism.found import search
 from mpam_calib.criticism.diagnose import told_of
-from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.unexplained.load_cell import FAULT, LATE, load_cell_rival
 from mpam_calib.criticism.verdict import judge

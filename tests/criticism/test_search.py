@@ -12,6 +12,7 @@ from rig import case as rig_case
 from rig.effects import shared_form
 from rig.recipes import Recipe, Wanted, build_case
 
+from criticism.found import search
 from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.climb import Climb, Place
@@ -19,7 +20,6 @@ from mpam_calib.criticism.fitting.fit import chain_for, doubt_on_rows, fit
 from mpam_calib.criticism.fitting.forms import flexible, forms_of, price
 from mpam_calib.criticism.fitting.refits import best_of, with_better_forms, with_doubt, with_doubted_equations
 from mpam_calib.criticism.searching import search as procedure
-from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.searching.searched import NEAR, POLISHED, Search
 from mpam_calib.criticism.tasks.spread import Alone, spread_over
 from mpam_calib.model.effect import effect, known_effects

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.criticism.searching.search import search
+from criticism.found import search
 from mpam_calib.criticism.verdict import Verdict, judge
 from mpam_calib.specimen.recording import Loops
 

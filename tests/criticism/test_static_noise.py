@@ -11,11 +11,11 @@ from model import build
 from rig.muscle import static_force
 from rig.specimens import FAMILIES, loops_muscle
 
+from criticism.found import search
 from mpam_calib.criticism.data.problem import Problem, build_problem
 from mpam_calib.criticism.data.static_noise import static_noise
 from mpam_calib.criticism.diagnose import diagnose
 from mpam_calib.criticism.searching.candidates import candidates
-from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.verdict import Verdict, judge
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.posterior.likelihood.points import gather_points

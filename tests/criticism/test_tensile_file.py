@@ -9,10 +9,10 @@ from rig import case as rig_case
 from rig import recipes, sets
 from rig.muscle import polynomial_stress
 
+from criticism.found import search
 from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.searching.candidates import candidates
-from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.specimen import read

@@ -15,11 +15,11 @@ from rig.conventions import CONVENTIONS
 from rig.effects import shared_form
 from rig.unusual import Unusual
 
+from criticism.found import search
 from mpam_calib.criticism.data.problem import Problem, build_problem
 from mpam_calib.criticism.fitting.fit import chain_for, fit
 from mpam_calib.criticism.fitting.forms import forms_of
 from mpam_calib.criticism.searching.candidates import candidates
-from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.specimen import read

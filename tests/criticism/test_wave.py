@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
+from criticism.found import search
 from mpam_calib.criticism.data.rows import Rows
 from mpam_calib.criticism.fitting.fit import fit
-from mpam_calib.criticism.searching.search import search
 from mpam_calib.criticism.unexplained.wave import wave_rms
 from mpam_calib.criticism.verdict import judge
 

@@ -91,7 +91,7 @@ def test_a_branch_that_was_never_recorded_is_extrapolated(friction: str) -> None
 
 
 def test_held_lengths_tell_neither() -> None:
-    held = np.where(muscle(NO_FRICTION).loops.branch > 0, PRESSURISING, DEPRESSURISING)  # type: ignore[union-attr]
+    held = np.where(build.loops().branch > 0, PRESSURISING, DEPRESSURISING)
     assert untold(muscle(NO_FRICTION, held)) == BOTH
 
 

@@ -33,20 +33,6 @@ DOUBTED = 4
 """Leading sets for each that is extended, doubted in the end."""
 
 
-def search(
-    problem: Problem,
-    tested: tuple[str, ...],
-    listener: Callable[[float], None] | None = None,
-    width: int = WIDTH,
-    workers: int = 1,
-    settle: bool = True,
-    journal: Journal | None = None,
-) -> Search:
-    """:func:`open_search`, whose workers are gone."""
-    with open_search(problem, tested, listener, width, workers, settle, journal) as found:
-        return found
-
-
 @contextmanager
 def open_search(
     problem: Problem,
