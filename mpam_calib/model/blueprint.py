@@ -67,7 +67,8 @@ class Blueprint(Value):
     with a clear pull, ``stroke_time`` (s) the median duration of a stroke (None without loops),
     ``reading_time`` (s) that between two readings, ``duration`` (s) that of the whole test, ``level_time``
     (s) the longest at one level and ``speed`` (m/s) the geometric mean of the strokes' speeds.
-    ``tensile_stiffness`` (Pa at a strain of one) is the scale of what a tensile test is fitted with.
+    ``tensile_stiffness`` (Pa at a strain of one) is the scale of what a tensile test is fitted with;
+    ``curves`` tells whether forces were recorded along the stroke, not at its ends alone.
     """
 
     simulation: Simulation
@@ -87,6 +88,7 @@ class Blueprint(Value):
     branches: bool
     onset: tuple[float, ...] = ()
     free_contraction: bool
+    curves: bool = True
     tensile_range: tuple[float, float] | None
     tensile_tested: tuple[float, float] | None = None
     tensile_stiffness: float = STRESS_SCALE
@@ -146,6 +148,7 @@ def draw_blueprint(
         speed=50.0 * MM / MINUTE if loops is None else _speed(loops),
         branches=any(p is not None and bool(np.any(np.abs(p.branch) == 1)) for p in parts),
         free_contraction=specimen.free_contraction is not None,
+        curves=any(p is not None for p in parts),
         tensile_range=_tensile_range(specimen),
         tensile_tested=None if specimen.tensile is None else specimen.tensile.strain_range,
         tensile_stiffness=_tensile_stiffness(specimen),

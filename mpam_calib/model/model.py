@@ -21,7 +21,7 @@ from mpam_calib.model.noise import (
     declared_noise_parameters,
     white_noise_parameter,
 )
-from mpam_calib.model.priors import LogNormal, Parameter
+from mpam_calib.model.priors import LogNormal, Normal, Parameter
 from mpam_calib.model.reference import reference_shape, rest_of
 from mpam_calib.model.remainder import Remainder, remainder_parameters
 from mpam_calib.model.state import Setting
@@ -31,6 +31,8 @@ from mpam_calib.physics.statics import modulus_columns
 Array = NDArray[np.float64]
 
 CONTRACTION_SD = "contraction_sd"
+COORDINATE = "modulus_coordinate_"
+"""What the names of the moduli's coordinates begin with where they are sampled."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,8 @@ class Model:
     """One declared simulation, ready to be calibrated: see the module's docstring.
 
     ``setting`` and ``chain`` are None for a specimen with only a tensile test, ``tensile`` where no
-    such test is part of the model, ``remainder`` where it is left out.
+    such test is part of the model, ``remainder`` where it is left out. ``coordinates_sampled`` are the
+    moduli's where free contractions alone tell how a curve falls: such readings are not linear in them.
     """
 
     blueprint: Blueprint
@@ -48,11 +51,13 @@ class Model:
     tensile: TensileModel | None
     remainder: Remainder | None
     extra: tuple[Parameter, ...]
+    coordinates_sampled: tuple[Parameter, ...] = ()
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Everything that is sampled, in the order of the sampler's coordinates."""
-        return (*(self.chain.parameters if self.chain else ()), *self.extra)
+        own = self.chain.parameters if self.chain else ()
+        return (*own, *self.extra, *self.coordinates_sampled)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -66,6 +71,12 @@ class Model:
     def coordinates(self, values: Mapping[str, Array]) -> Array:
         """Sampler coordinates (B, d) of SI values (B, 1)."""
         return np.concatenate([p.prior.to_normal(values[p.name]) for p in self.parameters], axis=1)
+
+    def moduli_of(self, values: Mapping[str, Array]) -> Array | None:
+        """The moduli's coordinates (B, p) where they are sampled."""
+        if not self.coordinates_sampled:
+            return None
+        return np.concatenate([values[p.name] for p in self.coordinates_sampled], axis=1)
 
     @cached_property
     def linear_sizes(self) -> tuple[int, int, int]:
@@ -108,7 +119,16 @@ def build_model(blueprint: Blueprint) -> Model:
     if tensile is not None:
         extra += tensile.parameters() if options.remainder else tensile.parameters()[:1]
     chain = None if setting is None else Chain(setting, moduli, options.nuisances)
-    return Model(blueprint, setting, chain, moduli, tensile, remainder, tuple(extra))
+    sampled: tuple[Parameter, ...] = ()
+    if blueprint.free_contraction and not blueprint.curves and simulation.order > 1 and tensile is None:
+        sampled = _coordinates(0 if moduli is None or blueprint.material is not None else moduli.size)
+    return Model(blueprint, setting, chain, moduli, tensile, remainder, tuple(extra), sampled)
+
+
+def _coordinates(size: int) -> tuple[Parameter, ...]:
+    """Coordinates of moduli, each a standard normal."""
+    meaning = "coordinate of the moduli"
+    return tuple(Parameter(f"{COORDINATE}{i + 1}", Normal(0.0, 1.0), meaning, "", "") for i in range(size))
 
 
 def _root(covariance: Array) -> Array:

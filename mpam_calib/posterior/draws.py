@@ -103,6 +103,8 @@ def reported(model: Model, draws: Draws, seed: int = 0) -> list[Reported]:
     """Everything ``summary.csv`` lists, in lab units: coefficients of the law first."""
     found = _coefficients(model, draws, seed)
     for parameter in model.parameters:
+        if parameter in model.coordinates_sampled:
+            continue
         name = parameter.name
         level = name.partition("@")[2]
         factor = si_factor(name)
@@ -164,7 +166,9 @@ def _rate(model: Model, draws: Draws, name: str) -> Reported:
 def _prior(model: Model, seed: int, count: int = 2000) -> tuple[Array, Array]:
     rng = np.random.default_rng([seed, 2])
     u = rng.standard_normal((count, len(model.names)))
-    return u, rng.standard_normal((count, model.linear_sizes[0]))
+    eta = rng.standard_normal((count, model.linear_sizes[0]))
+    sampled = model.moduli_of(model.values(u))
+    return u, eta if sampled is None else sampled
 
 
 def prior_draws(model: Model, names: list[str], seed: int) -> dict[str, Array]:

@@ -13,14 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.model import CONTRACTION_SD
-from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.density.collapsed import Collapsed
+from mpam_calib.posterior.density.free_ends import SHORT_SDS, STEP, Short
 from mpam_calib.posterior.density.target import predict_force
 from mpam_calib.posterior.draws import Draws
-from mpam_calib.posterior.likelihood.points import FREE
 
-SHORT_SDS, STEP = 5.0, 0.005
-"""Sds of a contraction's noise, and steps of the curves' grid, by which a first root is clearly short."""
 LEAST = 0.5
 """Share of each ensemble's draws that must be left: with fewer, it is the model that contradicts the data."""
 AT_ONCE = 400_000
@@ -56,23 +53,15 @@ def early_roots(target: Collapsed, draws: Draws) -> NDArray[np.bool_] | None:
     points, model = target.data.points, target.model
     if points is None or model.setting is None or CONTRACTION_SD not in draws.values:
         return None
-    free = points.take((points.kind == FREE) & ~points.censored)
-    if not len(free):
+    short = Short.of(points, model)
+    if short is None:
         return None
-    level = free.level(model.setting.levels)
-    by_size = np.lexsort((free.readings.displacement, level))
-    least = by_size[np.unique(level[by_size], return_index=True)[1]]
-    L0 = model.setting.geometry.L0
-    pressure, measured = free.readings.pressure[least], free.readings.displacement[least] / L0
-    grid = np.arange(int(np.ceil(measured.max() / STEP))) * STEP
-    P, g = (each.ravel() for each in np.meshgrid(pressure, grid, indexing="ij"))
-    end = np.repeat(measured, len(grid)) - STEP - SHORT_SDS * draws.values[CONTRACTION_SD]
-    inside = g < end.max(axis=0)
-    readings, g, end = Readings.at_rest(P[inside], L0 * g[inside]), g[inside], end[:, inside]
+    sd = draws.values[CONTRACTION_SD]
+    short = short.take(short.gap > STEP + SHORT_SDS * sd.min())
     early = np.zeros(len(draws), dtype=bool)
-    size = max(1, AT_ONCE // max(len(readings), 1))
-    for i in range(0, len(draws) if len(readings) else 0, size):
+    size = max(1, AT_ONCE // max(len(short.gap), 1))
+    for i in range(0, len(draws) if len(short.gap) else 0, size):
         some = draws.take(np.arange(i, min(i + size, len(draws))))
-        force = predict_force(model, some.values, some.eta, readings)
-        early[i : i + size] = ((force <= 0.0) & (g < end[i : i + size])).any(axis=1)
+        force = predict_force(model, some.values, some.eta, short.readings)
+        early[i : i + size] = short.gone(force, sd[i : i + size])
     return early

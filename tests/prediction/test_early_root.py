@@ -11,7 +11,9 @@ from model import build
 
 from mpam_calib.calibration import Calibration, calibrate
 from mpam_calib.model.blueprint import draw_blueprint
-from mpam_calib.posterior.density.target import build_target
+from mpam_calib.posterior.chains.sampling import Sampling, sample
+from mpam_calib.posterior.density.collapsed import Collapsed
+from mpam_calib.posterior.density.target import build_target, locate
 from mpam_calib.posterior.draws import Draws, keep_draws
 from mpam_calib.posterior.early_root import early_roots, without_early_roots
 from mpam_calib.prediction.curves import contraction_grid, first_root, force_curves
@@ -37,6 +39,16 @@ def calibrated() -> Calibration:
     return calibrate(blocked_and_free(), max_steps=100)
 
 
+@cache
+def integrated() -> tuple[Collapsed, Sampling]:
+    """The same with the moduli integrated out, under one slope for all draws."""
+    made = blocked_and_free()
+    target = build_target(made, draw_blueprint(made))
+    target = replace(target, model=replace(target.model, coordinates_sampled=()))
+    target, modes = locate(target, np.random.default_rng([0, 0]))
+    return target, sample(target, modes, 0, 100)
+
+
 def test_the_mean_lies_in_its_band() -> None:
     bands = calibrated().bands()
     free = bands[(bands["quantity"] == "free_contraction") & (bands["pressure_kPa"] > 0.0)]
@@ -46,10 +58,8 @@ def test_the_mean_lies_in_its_band() -> None:
 
 def test_no_draw_has_an_early_root() -> None:
     made = calibrated()
-    sampled = keep_draws(made.target, made.sampling, made.seed)
-    before, after = early_roots(made.target, sampled), early_roots(made.target, made.draws)
-    assert before is not None and 0 < before.sum() < 0.2 * len(sampled)
-    assert after is not None and not after.any()
+    early = early_roots(made.target, made.draws)
+    assert made.model.coordinates_sampled and early is not None and not early.any()
     free = made.specimen.free_contraction
     assert free is not None
     grid = contraction_grid(made.model, 0.3)
@@ -58,22 +68,26 @@ def test_no_draw_has_an_early_root() -> None:
 
 
 def test_draws_that_stay_are_where_they_were_and_the_others_of_their_ensemble() -> None:
-    made = calibrated()
-    sampled = keep_draws(made.target, made.sampling, made.seed)
-    gone = early_roots(made.target, sampled)
-    assert gone is not None
-    assert np.array_equal(made.draws.u[~gone], sampled.u[~gone])
-    assert np.array_equal(made.draws.eta[~gone], sampled.eta[~gone])
+    target, sampling = integrated()
+    sampled = keep_draws(target, sampling, 0)
+    gone = early_roots(target, sampled)
+    assert gone is not None and 0 < gone.sum() < 0.2 * len(sampled)
+    left = without_early_roots(target, sampled, 0)
+    after = early_roots(target, left)
+    assert after is not None and not after.any()
+    assert np.array_equal(left.u[~gone], sampled.u[~gone])
+    assert np.array_equal(left.eta[~gone], sampled.eta[~gone])
+    assert sampled.index is not None and left.index is not None
+    assert left.index.shape == (sampled.chains, len(sampled) // sampled.chains)
     shape = (sampled.chains, -1, sampled.u.shape[1])
-    for own, all_of_it in zip(made.draws.u.reshape(shape), sampled.u.reshape(shape), strict=True):
+    for own, all_of_it in zip(left.u.reshape(shape), sampled.u.reshape(shape), strict=True):
         assert {tuple(u) for u in own} <= {tuple(u) for u in all_of_it}
-    again = without_early_roots(made.target, sampled, made.seed)
-    assert np.array_equal(again.u, made.draws.u)
-    # The density that is stored beside each draw is its own.
-    assert again.index is not None and again.index.shape == (sampled.chains, len(sampled) // sampled.chains)
-    chain = made.sampling.chain.reshape(sampled.chains, -1, sampled.u.shape[1])
+    again = without_early_roots(target, sampled, 0)
+    assert np.array_equal(again.u, left.u)
+    # What is stored beside each draw is its own.
+    drawn = sampling.chain.reshape(sampled.chains, -1, sampled.u.shape[1])
     assert np.array_equal(
-        np.take_along_axis(chain, again.index[:, :, None], axis=1).reshape(len(again), -1), again.u
+        np.take_along_axis(drawn, left.index[:, :, None], axis=1).reshape(left.u.shape), left.u
     )
 
 

@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from mpam_calib.model.model import CONTRACTION_SD, Model
 from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, TIME, WHITE, grown
 from mpam_calib.model.remainder import ROUGH, SMOOTH
-from mpam_calib.model.tensile import MISFIT, NOISE
+from mpam_calib.posterior.density.free_ends import FreeEnds
 from mpam_calib.posterior.density.guide import Guide
 from mpam_calib.posterior.density.piece import Piece, forget, segment_piece, total, white_piece
 from mpam_calib.posterior.density.slack import Slack, with_slack
+from mpam_calib.posterior.density.tensile_piece import tensile_piece
 from mpam_calib.posterior.likelihood.algebra import (
     LOG_2PI,
     condense,
@@ -43,6 +44,9 @@ from mpam_calib.posterior.likelihood.sites import FreeRows, Sites, chunk_log_lik
 from mpam_calib.posterior.likelihood.strokes import Strokes
 from mpam_calib.posterior.likelihood.tensile_points import TensilePoints
 from mpam_calib.posterior.likelihood.white import white_terms
+
+KNOWN = 1e9
+"""Precision's root of coordinates that are given."""
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Array]
@@ -113,6 +117,7 @@ class Collapsed:
         slack: list[Slack] = []
         free: list[FreeRows] = []
         gram, pull, constant = total(self._pieces(values, slack, free))
+        sampled = self.model.moduli_of(values)
         diagonal = np.arange(gram.shape[1])
         gram[:, diagonal, diagonal] += 1.0
         if slack:
@@ -124,6 +129,10 @@ class Collapsed:
             mean = solve_transposed(factor, centre) if free else centre
         for rows in free:
             value = value + rows.correction(mean, values[FREEDOM][:, 0])
+        if sampled is not None:  # nothing else told of them, and they are known
+            p = sampled.shape[1]
+            factor[:, range(p), range(p)] = KNOWN
+            centre[:, :p] = KNOWN * sampled
         return value, centre, factor
 
     def _pieces(self, values: Values, slack: list[Slack], free: list[FreeRows]) -> list[Piece]:
@@ -133,7 +142,7 @@ class Collapsed:
         if self.data.points is not None:
             pieces.append(self._points(values, self.data.points, slack, free))
         if self.data.tensile is not None and self.model.tensile is not None:
-            pieces.append(self._tensile(values, self.data.tensile))
+            pieces.append(tensile_piece(self.model, values, self.data.tensile))
         return pieces
 
     @cached_property
@@ -152,6 +161,12 @@ class Collapsed:
         if self.model.remainder is None or self.data.points is None:
             return None
         return self.model.remainder.columns(self.data.points.readings)
+
+    @cached_property
+    def _free_ends(self) -> FreeEnds | None:
+        if self.data.points is None or not self.model.coordinates_sampled:
+            return None
+        return FreeEnds.build(self.data.points, self.model)
 
     def _design(self, values: Values, moduli: Array, remainder: Array | None) -> Array:
         """All columns (B, n, k) out of the moduli's (B, n, p) and the remainder's (n, q)."""
@@ -328,55 +343,44 @@ class Collapsed:
     def _points(self, values: Values, points: Points, slack: list[Slack], free: list[FreeRows]) -> Piece:
         assert self.model.chain is not None
         terms = self.model.chain.terms(values, points.readings, self.guide.points, self.guide.point_echo)
-        design = self._design(values, terms.columns, self._point_remainder)
+        fixed, columns = terms.fixed, terms.columns
+        moduli = self.model.moduli_of(values)
+        ends = self._free_ends.at(values, moduli) if self._free_ends and moduli is not None else None
+        if moduli is not None:
+            fixed, columns = fixed + np.einsum("bnp,bp->bn", columns, moduli), np.zeros_like(columns)
+        design = self._design(values, columns, self._point_remainder)
         B = len(design)
         variance = np.broadcast_to(values[WHITE] ** 2, (B, len(points))).copy()
         if GROWTH in values:
             force = points.force if self.guide.points is None else self.guide.points
             variance *= self._growth(values, force) ** 2
         at_zero = points.kind == FREE
+        if ends is not None:
+            fixed[:, at_zero] = ends.force
         if at_zero.any():
-            slope = self.guide.slope if self.guide.slope is not None else np.zeros(len(points))
-            length = self.model.setting.geometry.L0 if self.model.setting else 1.0
-            variance[:, at_zero] += (values[CONTRACTION_SD] * length * slope[at_zero]) ** 2
-        residual = np.broadcast_to(points.force - terms.fixed, (B, len(points)))
+            assert self.model.setting is not None
+            slope = np.zeros(len(points)) if self.guide.slope is None else self.guide.slope
+            falls = self.model.setting.geometry.L0 * (slope[at_zero] if ends is None else ends.slope)
+            variance[:, at_zero] += (values[CONTRACTION_SD] * falls) ** 2
+        residual = np.broadcast_to(points.force - fixed, (B, len(points)))
         seen = ~points.censored
         if points.censored.any():
             rows = points.censored
             slack.append(
                 Slack(
-                    np.broadcast_to(terms.fixed, (B, len(points)))[:, rows],
+                    np.broadcast_to(fixed, (B, len(points)))[:, rows],
                     design[:, rows],
                     np.tile(np.where(points.kind[rows] == FREE, 0.0, self.data.floor), (B, 1)),
                     np.sqrt(variance[:, rows]),
                 )
             )
-        if FREEDOM not in values:
-            return white_piece(design[:, seen], residual[:, seen], variance[:, seen])
-        scale = np.sqrt(variance[:, seen])
-        noise = None if self.guide.point_noise is None else self.guide.point_noise[seen]
-        sites = Sites.at(noise, scale, values[FREEDOM][:, 0])
-        spread = variance[:, seen] * sites.spread
-        residual = residual[:, seen] - scale * sites.shift
-        free.append(FreeRows(design[:, seen] / spread[..., None], residual / spread, scale, sites))
-        return white_piece(design[:, seen], residual, spread)
-
-    def _tensile(self, values: Values, tensile: TensilePoints) -> Piece:
-        model = self.model.tensile
-        assert model is not None and self.model.moduli is not None
-        sizes = self.model.linear_sizes
-        B = len(values[NOISE])
-        mean, matrix = self.model.moduli.transform(values)
-        powers = model.powers(tensile.strain)
-        design = np.zeros((B, len(tensile.strain), sum(sizes)))
-        design[:, :, : sizes[0]] = powers @ matrix
-        if MISFIT in values:
-            design[:, :, sizes[0] + sizes[1] :] = values[MISFIT][:, :, None] * model.remainder(tensile.strain)
-        residual = np.broadcast_to(tensile.stress - powers @ mean[0], design.shape[:2])
-        variance = values[NOISE] ** 2
-        piece = white_piece(design, residual, variance / tensile.count)
-        # What scatters about the points knows the noise alone.
-        others = tensile.rows - len(tensile.strain)
-        scatter = tensile.within / variance + others * (np.log(variance) + LOG_2PI)
-        weights = float(np.log(tensile.count).sum())
-        return piece._replace(constant=piece.constant + scatter[:, 0] + weights)
+        design, residual, spread = design[:, seen], residual[:, seen], variance[:, seen]
+        if FREEDOM in values:
+            scale = np.sqrt(spread)
+            noise = None if self.guide.point_noise is None else self.guide.point_noise[seen]
+            sites = Sites.at(noise, scale, values[FREEDOM][:, 0])
+            spread = spread * sites.spread
+            residual = residual - scale * sites.shift
+            free.append(FreeRows(design / spread[..., None], residual / spread, scale, sites))
+        piece = white_piece(design, residual, spread)
+        return piece if ends is None else piece._replace(constant=piece.constant - 2.0 * ends.log_weight)

@@ -13,8 +13,9 @@ from mpam_calib.model.noise import CORRELATED, FREEDOM, GROWTH, WHITE
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import ROUGH, SMOOTH
 from mpam_calib.posterior.density.collapsed import Collapsed, Data
+from mpam_calib.posterior.density.free_ends import SLOPE_STEP
 from mpam_calib.posterior.density.guide import Guide
-from mpam_calib.posterior.density.mode import Mode, climb_modes, find_modes
+from mpam_calib.posterior.density.mode import CLIMBED, Mode, climb_modes, evaluate, find_modes
 from mpam_calib.posterior.likelihood.bins import LoopBins, bin_loops
 from mpam_calib.posterior.likelihood.points import FREE, floor_of, gather_points
 from mpam_calib.posterior.likelihood.sites import LEAST_SHARE
@@ -27,12 +28,12 @@ GUIDE_ROUNDS, SITE_ROUNDS = 4, 12
 """Rounds in which guide forces, and sites of heavy-tailed noise, may settle."""
 GUIDE_TOLERANCE = 0.02
 """Share of the noise by which a guide force may still move between rounds."""
+STARTS = 2048
+"""Draws with moduli that are looked at before they are climbed from."""
 ECHO_TOLERANCE = 0.005
 """Share of itself by which the echo of a force that depends on itself may still move, on average."""
 SITE_TOLERANCE = 0.02
 """Share of the typical noise by which that of a heavy-tailed row may still move."""
-SLOPE_STEP = 1e-3
-"""Contraction step of the slope at a free contraction."""
 
 
 def build_target(specimen: Specimen, blueprint: Blueprint) -> Collapsed:
@@ -91,7 +92,10 @@ def locate(target: Collapsed, rng: np.random.Generator) -> tuple[Collapsed, list
     contraction, noise that grows) is fed with the model's force at the mode, until that no longer moves;
     and the sites that stand for heavy-tailed noise are those of the mode.
     """
-    found = _settle(target, find_modes(target, rng))
+    if target.model.coordinates_sampled:
+        found = _with_moduli(target, rng)
+    else:
+        found = _settle(target, find_modes(target, rng))
     if FREEDOM not in target.model.names:
         return found
     # What looks like structure may be bursts: sites settle there first, then everything else.
@@ -101,6 +105,32 @@ def locate(target: Collapsed, rng: np.random.Generator) -> tuple[Collapsed, list
         other = replace(other, guide=_eased(other.guide, _guide(other, start)))
     bursts = _settle(other, climb_modes(other, [start]))
     return max((found, bursts), key=lambda pair: pair[1][0].log_posterior)
+
+
+def _with_moduli(target: Collapsed, rng: np.random.Generator) -> tuple[Collapsed, list[Mode]]:
+    """The same where the moduli are sampled: climbs start from draws of a target that integrates them out.
+
+    There every curve falls as steeply as a straight line from the blocked force. Where no draw can be, the
+    simulation contradicts the free contractions, and that target stands in.
+    """
+    model, points = target.model, target.data.points
+    assert model.setting is not None and points is not None
+    integrated = replace(model, coordinates_sampled=())
+    start = np.zeros((1, len(integrated.names)))
+    way = np.maximum(points.readings.displacement, SLOPE_STEP * model.setting.geometry.L0)
+    at_rest = Readings.at_rest(points.readings.pressure, np.zeros(len(points)))
+    moduli = np.zeros((1, sum(model.linear_sizes)))
+    blocked = predict_force(integrated, integrated.values(start), moduli, at_rest)[0]
+    twin = replace(target, model=integrated, guide=replace(target.guide, slope=-np.abs(blocked) / way))
+    modes = find_modes(twin, rng)
+    u = rng.multivariate_normal(modes[0].u, modes[0].covariance, STARTS)
+    eta = twin.linear_draws(integrated.values(u), rng)
+    u = np.concatenate([u, eta[:, : model.linear_sizes[0]]], axis=1)
+    height = evaluate(target, u)
+    if not np.isfinite(height).any():
+        return _settle(twin, modes)
+    best = u[np.argsort(-height)[:CLIMBED]]
+    return _settle(target, climb_modes(target, list(best)))
 
 
 def _eased(old: Guide, new: Guide) -> Guide:
@@ -200,6 +230,7 @@ def _matters(target: Collapsed, guide: Guide) -> bool:
             return True
     signs = any(item is not None and bool(np.any(item < 0.0)) for item in (guide.bins, guide.points))
     slopes = data.points is not None and bool(np.any(data.points.kind == FREE))
+    slopes &= not target.model.coordinates_sampled
     if not (chain.uses_force or signs or slopes or GROWTH in target.model.names):
         return False
     setting = chain.setting
