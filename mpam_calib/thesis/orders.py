@@ -22,12 +22,16 @@ MATERIAL = np.array([3.769e4, 2.676e4])
 
 @dataclass(frozen=True)
 class Fit:
-    """One force model against the decoded average: both kinds of R² and the residual, N."""
+    """One force model against the decoded average: both kinds of R² and the residual, N.
+
+    ``order`` is that of its polynomial, 0 where nothing was fitted.
+    """
 
     model: str
     squared_correlation: float
     determination: float
     rmse_N: float
+    order: int = 0
 
 
 def curve(muscle: str, limit: float) -> tuple[Array, Array]:
@@ -61,7 +65,7 @@ def order_fit(muscle: str, limit: float, order: int, convention: str = "stretch"
     gamma, F = curve(muscle, limit)
     G = decoded.gas_and_thickness(decoded.LEVELS[LEVEL], gamma)
     X = decoded.columns(gamma, order, convention)
-    return _fit(f"M = {order}", G + X @ least_squares(X, F - G, 1.0 / F), F)
+    return _fit(f"M = {order}", G + X @ least_squares(X, F - G, 1.0 / F), F, order)
 
 
 def order_table(muscle: str, limit: float, orders: range, convention: str = "stretch") -> list[Fit]:
@@ -75,7 +79,25 @@ def order_table(muscle: str, limit: float, orders: range, convention: str = "str
     return rows + [order_fit(muscle, limit, order, convention) for order in orders]
 
 
-def _fit(model: str, fitted: Array, observed: Array) -> Fit:
+def tabled_order(muscle: str) -> int:
+    """Order of the moduli that the thesis tabulates, which is the decoded curve's own."""
+    return int(decoded.moduli(muscle).shape[1])
+
+
+def least_correlation(own: float, shared: float) -> float:
+    """Least R² with the measurement of a curve that has ``shared`` with one whose R² with it is ``own``.
+
+    R² is the squared cosine of the angle between two centred curves, and angles add up at most.
+    """
+    angle = np.arccos(np.sqrt(own)) + np.arccos(np.sqrt(shared))
+    return float(np.cos(min(angle, np.pi / 2.0)) ** 2)
+
+
+def _fit(model: str, fitted: Array, observed: Array, order: int = 0) -> Fit:
     return Fit(
-        model, squared_correlation(fitted, observed), determination(fitted, observed), rmse(fitted, observed)
+        model,
+        squared_correlation(fitted, observed),
+        determination(fitted, observed),
+        rmse(fitted, observed),
+        order,
     )
