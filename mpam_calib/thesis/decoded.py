@@ -120,3 +120,16 @@ def decoded_curves(muscle: str, contraction: Array) -> Curves:
     E = moduli(muscle)
     f = np.stack([force(np.asarray(p), contraction, e) for p, e in zip(LEVELS, E, strict=True)])
     return Curves(LEVELS, np.asarray(contraction, dtype=float), f)
+
+
+def blocked_ratio() -> Array:
+    """MPAM2's blocked force over MPAM1's at each level, (5,)."""
+    first, second = (decoded_curves(muscle, np.zeros(1)).force[:, 0] for muscle in ("MPAM1", "MPAM2"))
+    return second / first
+
+
+def bladder_at_rest(muscle: str) -> Array:
+    """F_NL at γ = 0, what the bladder adds to the blocked force at each level (N), (5,)."""
+    zero = np.asarray(0.0)
+    pairs = zip(LEVELS, moduli(muscle), strict=True)
+    return np.array([float(force(P, zero, E) - gas_and_thickness(P, zero)) for P, E in pairs])

@@ -59,7 +59,11 @@ def _lead(ledger: Ledger) -> list[Block]:
         ),
         Numbers(
             [
-                KeyNumber("reproduced", str(n[REPRODUCED]), note="to the printed digits and their rounding"),
+                KeyNumber(
+                    "reproduced",
+                    str(n[REPRODUCED]),
+                    note="to rounding, or the text's “nearly”; flat optima to 0.2 %",
+                ),
                 KeyNumber("misprint", str(n[MISPRINT]), note="each with its proof below"),
                 KeyNumber("not reproducible", str(n[NOT_REPRODUCIBLE]), note="measured curves are lost"),
                 KeyNumber("recomputed besides", str(n["unprinted"]), note="values not printed as numbers"),

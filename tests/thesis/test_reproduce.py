@@ -146,9 +146,17 @@ def test_numbers_of_the_text(rows: pd.DataFrame) -> None:
         ("Text 4.7", "Present work (MPAM_1)", "blocked force over Festo's (%)"): MISPRINT,
         ("Text 4.6.2.3", "theoretical friction", "mean R² (%)"): MISPRINT,
         ("Text 4.4", "300 kPa", "MPAM2 over MPAM1 (%)"): MISPRINT,
+        # "Almost 238 N" above; here the text says 238 N.
+        ("Text 4.7", "600 kPa", "blocked force (N)"): MISPRINT,
     }
     for place, verdict in expected.items():
         assert cell(rows, *place)["verdict"] == verdict, place
+    # Statements without a number are errata, and a pressure is not held against a percentage.
+    assert not rows.loc[rows["printed"] != "", "note"].str.contains("identical|impact").any()
+    assert np.isnan(cell(rows, "Text 4.4", "MPAM2 at 20 kPa", "error (%)")["computed"])
+    assert "31.8°" in cell(rows, "Text 1.3", "contractile or extensile", "braid angle (°)")["note"]
+    slip = cell(rows, "Table 3.5", "100", "Cost function (Case I)")["note"]
+    assert "39.793778 cut off" in slip
 
 
 @pytest.mark.long
@@ -342,6 +350,8 @@ def test_page_says_what_is_missing_and_how_to_add_it(out: Path) -> None:
     assert "Posteriors: none given" in text
     for option in ("--mpam1 RUN1", "--mpam2 RUN2", "--mpam1-strand RUN3"):
         assert option in text
+    # The declared braid is chapter 3's; f_s of chapter 4 belongs to another modulus.
+    assert f"E_br_GPa = {decoded.E_BR / 1e9:.1f}" in text
 
 
 def test_draws_of_f_s_beside_the_print() -> None:

@@ -167,7 +167,8 @@ def _table_3_5(ledger: Ledger, chapter: Chapter3) -> None:
             note=f"with n = {n}; {optimum}",
             misprint=f"columns swapped and a digit slipped: Case I with n = 50 is {by_n[50]:.5f} N, which "
             "stands in the "
-            f"Case II column; 39.70377 is Case II's 39.79378 with 9 read as 0",
+            f"Case II column; 39.70377 is Case II's {best_force(P):.6f} cut off after five decimals, a 9 "
+            "read as 0",
         )
         ledger.check(
             printed.source,
