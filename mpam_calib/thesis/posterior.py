@@ -19,7 +19,7 @@ from mpam_calib.errors import InputError
 from mpam_calib.posterior.stored import RUN_FILE, unconverged
 from mpam_calib.thesis import decoded, friction
 from mpam_calib.thesis.tables import table
-from mpam_calib.units import DEG, MM
+from mpam_calib.units import DEG, GPA, MM
 
 Array = NDArray[np.float64]
 
@@ -222,7 +222,8 @@ MISSING = {
     ),
     MPAM1_STRAND: (
         "bands in Fig. 4.21; MPAM1's f_s by posterior (Fig. 4.20)",
-        'in a copy of datasets/mpam1_reconstructed set friction = "strand" and friction_by_pressure = false; '
+        'in a copy of datasets/mpam1_reconstructed set friction = "strand", friction_by_pressure = false and '
+        f"E_br_GPa = {decoded.E_BR / GPA:.1f} (chapter 4's); "
         "mpam-calib calibrate COPY -o RUN3; mpam-calib reproduce -o DIR --mpam1-strand RUN3",
     ),
 }
