@@ -12,7 +12,7 @@ from mpam_calib.specimen.declaration import Braid, Geometry
 
 NYLON = {"E_br_GPa": 2.1, "nu_s": 0.33}
 STRANDS, THICKNESS = 48, 0.04
-"""Strands of a usual sleeve, and their radius as a share of the muscle's: those of the thesis's muscles."""
+"""Strands of a usual sleeve, and their radius as a share of the muscle's: nominal values of ours."""
 SHAPE_ALONE = "no [braid] in specimen.toml: looked for by its shape alone, it is not among the causes"
 
 
