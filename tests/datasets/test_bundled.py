@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import sys
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
@@ -13,7 +15,7 @@ import pandas as pd
 import pytest
 
 from mpam_calib.thesis import decoded
-from mpam_calib.thesis.tables import NAMES, table
+from mpam_calib.thesis.tables import NAMES, half_unit, table
 
 DATASETS = Path(__file__).parents[2] / "datasets"
 RECONSTRUCTED = {"MPAM1": "mpam1_reconstructed", "MPAM2": "mpam2_reconstructed"}
@@ -102,6 +104,37 @@ def test_force_is_the_decoded_curve_with_its_friction_and_noise(muscle: str) -> 
     assert abs(lag[1]) < 0.03
 
 
+@pytest.mark.parametrize(
+    ("muscle", "at_rest", "told"),
+    [
+        ("MPAM1", [0.33, 0.46, 0.57, 0.57, 0.57], ["0.3-0.7 N", "-0.4 to\n  -2.8 kN"]),
+        (
+            "MPAM2",
+            [0.005, 0.655, 0.655, 0.655, 0.655],
+            ["0.65 N (sd)", "0.005 N at 50 kPa", "-1.7 to\n  -3.3 kN", "4 N there and 20 N at L0"],
+        ),
+    ],
+)
+def test_what_printed_digits_and_strains_do_to_the_force(
+    muscle: str, at_rest: list[float], told: list[str]
+) -> None:
+    cells, E = table(decoded.MUSCLES[muscle]).cells, decoded.moduli(muscle)
+    half = np.array([[half_unit(text) for text in row] for row in cells])
+    if muscle == "MPAM1":
+        half[0, 3] = 625.0  # from Table 4.4's intercept
+    lever = decoded.columns(np.asarray(0.0), E.shape[1])
+    # Uniform within the last digit
+    assert np.sqrt(np.sum((lever * half) ** 2, axis=1) / 3.0) == pytest.approx(at_rest, abs=0.006)
+    free = [
+        float(decoded.force(P, np.asarray(decoded.first_root(float(P), own)), own, "engineering"))
+        for P, own in zip(decoded.LEVELS, E, strict=True)
+    ]
+    pushes = [F for F in free if F < 0]
+    text = (DATASETS / RECONSTRUCTED[muscle] / "README.md").read_text(encoding="utf-8")
+    assert all(words in text for words in told)
+    assert f"{max(pushes) / 1e3:.1f} to\n  {min(pushes) / 1e3:.1f} kN" in text
+
+
 @pytest.mark.parametrize("folder", sorted(p.parent.name for p in DATASETS.glob("*/specimen.toml")))
 def test_every_specimen_names_files_that_are_there(folder: str) -> None:
     declared = tomllib.loads((DATASETS / folder / "specimen.toml").read_text(encoding="utf-8"))
@@ -118,6 +151,8 @@ def test_every_folder_has_a_readme_with_source_and_licence() -> None:
         assert "**Source.**" in text, folder.name
         if not folder.name.startswith("mpam"):
             assert "**Licence.**" in text, folder.name
+        for name in re.findall(r"`(\w*LICENSE\w*(?:\.md)?)`", text):
+            assert (folder / name).is_file(), (folder.name, name)
 
 
 @pytest.mark.parametrize(
@@ -128,6 +163,25 @@ def test_festo_maps_are_whole(folder: str, rows: int, censored: int) -> None:
     assert len(data) == rows
     assert ((data.force_N == 0) == (data.censored == 1)).all()
     assert data.censored.sum() == censored
+
+
+@pytest.mark.parametrize(
+    ("folder", "ends", "off"),
+    [
+        ("festo_dmsp10", (5, 260, 360, 528.75, 650), {50: 5, 441.375: 444.375}),
+        ("festo_dmsp20", (35, 135, 180, 250, 375, 675), {65: 60}),
+    ],
+)
+def test_festo_levels_off_the_equal_steps_are_told(
+    folder: str, ends: tuple[float, ...], off: dict[float, float]
+) -> None:
+    """Both grids are four equal steps from end to end; what is not on them stays as quoted."""
+    levels = np.unique(pd.read_csv(DATASETS / folder / "force_map.csv").pressure_kPa)
+    steps = np.unique(np.concatenate([np.linspace(a, b, 5) for a, b in pairwise(ends)]))
+    found = {a: b for a, b in zip(levels, steps, strict=True) if abs(a - b) > 1e-3}
+    assert found == off
+    caveats = (DATASETS / folder / "README.md").read_text(encoding="utf-8").partition("**Caveats.**")[2]
+    assert all(f"{a:g} kPa" in caveats and f"{b:g}" in caveats for a, b in off.items())
 
 
 def test_the_cylinder_takes_the_higher_force_on_loading() -> None:
