@@ -1,7 +1,7 @@
 """The published calibration as it has to be read: stretches, R of Eq. 4.16, moduli of Tables 4.3 and 4.7.
 
 The measured curves are lost. With strains (L/L0 − 1, R/R0 − 1), as Eq. 4.5 prints them, the tabled moduli
-give forces of −2 kN; with stretches (L/L0, R/R0) they give the muscle back. What comes out is called
+give down to −3 kN; with stretches (L/L0, R/R0) they give the muscle back. What comes out is called
 reconstructed, never measured.
 """
 
