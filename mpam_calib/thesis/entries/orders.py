@@ -114,8 +114,8 @@ def _not_converged(selection: OrderTable, text: str, fit: orders.Fit) -> str:
     if fit.order > tabled and number(text) < own - LIKELY_FALL:
         return (
             f"this order or M = {tabled} is hardly converged: in 2,621 random disturbances no higher order "
-            f"lost more than {LIKELY_FALL} of R², and this is {own - number(text):.4f} below M = {tabled} (no "
-            "proof: they do not maximise R², and the print at M = 2 is below M = 1 in both tables)"
+            f"lost more than {LIKELY_FALL} of R², and this is {own - number(text):.4f} below M = {tabled} ("
+            "no proof: they do not maximise R², and the print at M = 2 is below M = 1 in both tables)"
         )
     if not 0 < fit.order < tabled:
         return ""
