@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 STRANDS = "braid_stretch"
 """The effect whose term (Eq. 2.25) is the braid's in Eq. 3.12."""
 STRANDS_FACTOR = "braid_factor"
+LEAST_SHARE = 1e-6
+"""Share of the remainder below which a design is taken to have none."""
 STEEPEST, FLATTEST = 89.0 * DEG, 1.0 * DEG
 """No tolerance turns a strand beyond these."""
 
@@ -88,10 +90,12 @@ class MuscleDraws:
         force = chain.force(values, self.draws.eta[:, :p], readings)
         if self.model.remainder is not None:
             left = self.draws.eta[:, p : p + q] @ self.model.remainder.columns(readings).T
-            left = self.draws.values[SMOOTH] * left
+            left, share = self.draws.values[SMOOTH] * left, self._share(x)
             if self.beyond is not None:
-                left = left + self.beyond.force(readings)
-            force = force + left * self._share(x)
+                # What the remainder comes to is a force of the tested muscle's size.
+                own = force / np.maximum(share, LEAST_SHARE) + left
+                left = left + self.beyond.force(readings, own)
+            force = force + left * share
         return force
 
     def _chain(self, x: Array) -> Chain:

@@ -28,6 +28,8 @@ STREAM = 14
 """Tells these random numbers from all others of a seed."""
 KEPT_SD = 0.5
 """Of what fades below the lowest level: within two of it all may stay, as a dead-band's share does."""
+TURNED = 2.0
+"""Of the force below the lowest level, what may be missed of it: with less its sign could never turn."""
 
 
 @dataclass(frozen=True)
@@ -69,13 +71,16 @@ class Beyond:
             kept=KEPT_SD * rng.standard_normal((len(draws), 1)),
         )
 
-    def force(self, readings: Readings) -> Array:
-        """Force (N, n) that comes to the model's at readings (n,): 0 from the lowest to the highest level."""
+    def force(self, readings: Readings, known: Array) -> Array:
+        """Force (N, n) that comes to the model's, ``known`` (N, n), at readings (n,).
+
+        0 from the lowest to the highest level.
+        """
         P, lowest, highest = readings.pressure, self.levels[0], self.levels[-1]
         added = np.zeros((len(self.size), len(readings)))
         below, above = np.flatnonzero((lowest > P) & (P >= 0.0)), np.flatnonzero(highest < P)
         if len(below):
-            added[:, below] = self._below(readings.take(below))
+            added[:, below] = self._below(readings.take(below), known[:, below])
         if len(above) and highest > 0.0:
             added[:, above] = self._above(readings.take(above))
         return added
@@ -87,17 +92,18 @@ class Beyond:
             added += self._fitted(readings) * (P / highest - 1.0)
         return added
 
-    def _below(self, readings: Readings) -> Array:
+    def _below(self, readings: Readings, known: Array) -> Array:
         P, lowest = readings.pressure, self.levels[0]
         share = P / lowest
         edge = self._fitted(replace(readings, pressure=np.full(len(P), lowest)))
         missed = self._along(self.below, readings) * ((lowest - P) / self._spacing)
         # What a wall or the gas is wrong by fades with the pressure; what a dead-band takes does not.
         missed += self.kept * edge * (1.0 - share)
-        # Without pressure nothing pulls: what is missed is at most the gas's whole pull.
-        most = self.pull * P
-        missed *= most / np.maximum(np.hypot(missed, most), np.finfo(float).tiny)
-        added: Array = share * edge - self._fitted(readings) + missed
+        added: Array = share * edge - self._fitted(readings)
+        # Without pressure nothing pulls: what is missed is at most the gas's whole pull. Where a dead-band or
+        # a gauge's offset has made up for a misfit the model pulls even there: all of that may be wrong.
+        most = np.maximum(self.pull * P, TURNED * np.abs(known + added))
+        added += missed * most / np.maximum(np.hypot(missed, most), np.finfo(float).tiny)
         return added
 
     @property

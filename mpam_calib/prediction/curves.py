@@ -85,7 +85,7 @@ def force_curves(model: Model, draws: Draws, pressures: Array, contractions: Arr
         parts.append(predict_force(model, values, draws.eta[i : i + size], readings))
     force = np.concatenate(parts)
     if (beyond := Beyond.draw(model, draws, seed)) is not None:
-        force += beyond.force(readings)
+        force += beyond.force(readings, force)
     force = force.reshape(len(draws), *shape)
     if ROUGH in draws.values:
         for j, pressure in enumerate(pressures):

@@ -22,10 +22,11 @@ from mpam_calib.posterior.draws import Draws
 from mpam_calib.prediction.bands import muscle_bands
 from mpam_calib.prediction.beyond import Beyond
 from mpam_calib.prediction.curves import force_curves
-from mpam_calib.specimen.recording import Specimen
+from mpam_calib.specimen.declaration import Sensors
+from mpam_calib.specimen.recording import ForceMap, Specimen
 
 from .coverage import posterior_draws
-from .far_off import far_off
+from .far_off import Array, Curve, far_off
 
 MUSCLES = 6
 RECORDED = ((0, 1, 2, 3), (1, 2), (2,))
@@ -33,6 +34,7 @@ RECORDED = ((0, 1, 2, 3), (1, 2), (2,))
 ALONG = np.array([0.0, 0.04, 0.08])
 ABOVE, BELOW = (0.5, 1.0), (-0.5, -1.0)
 """Distances from the outer levels, in spacings."""
+TANH_LEVELS = (100.0, 150.0, 200.0, 250.0, 300.0)
 DRAWS = 4000
 
 
@@ -99,10 +101,58 @@ def test_a_remainder_that_stays_as_it_is_misses_them(cases: list[Case]) -> None:
     assert above.mean() < 0.3 and lone.mean() < 0.3
 
 
-def made(levels_kPa: tuple[float, ...], options: Options | None = None) -> tuple[Model, Draws]:
+def tanh_muscle(seed: int, effects: tuple[str, ...], bias_kPa: float) -> tuple[Specimen, Curve]:
+    """A force map of a muscle that the simulation cannot follow, and its true force (N) at a pressure (kPa)
+    and contractions: its rubber is no polynomial, and its tips take up a share of the length."""
+    rng = np.random.default_rng([seed, 11])
+    g = build.GEOMETRY
+    dead, stiff, bent, tips = (rng.uniform(*each) for each in ((0, 12), (10, 35), (2, 5), (0, 0.3)))
+    angle = np.radians(g.alpha0_deg)
+
+    def force(pressure: float, contraction: Array) -> Array:
+        sine = np.sin(angle) * (1.0 - contraction * (1.0 + tips * contraction))
+        radius = g.R0_mm * np.sqrt(1.0 - sine**2) / np.cos(angle)
+        gas = 1e-3 * np.pi * radius**2 * (2.0 * sine**2 / (1.0 - sine**2) - 1.0)
+        rubber = stiff * np.tanh(bent * contraction) * (0.7 + pressure / 1e3)
+        return np.maximum(pressure - dead, 0.0) * gas - rubber
+
+    rows = []
+    for level, pressure in enumerate(TANH_LEVELS):
+        contraction = np.linspace(0.0, 0.3, 20)
+        pull = force(pressure, contraction)
+        rows += [(pressure, c, F, level) for c, F in zip(contraction[pull > 0], pull[pull > 0], strict=True)]
+    P, contraction, pull, level = np.array(rows).T
+    readings = ForceMap(
+        1e3 * P, contraction, pull + 0.2 * rng.standard_normal(len(P)), level.astype(np.int64),
+        np.zeros(len(P), dtype=np.int64), np.zeros(len(P), dtype=bool),
+    )  # fmt: skip
+    made = build.specimen(
+        {"law": "linear", "order": 2, "effects": effects, "friction": "none"},
+        levels_kPa=TANH_LEVELS,
+        force_map=readings,
+        sensors=Sensors(force_sd_N=0.2, pressure_bias_sd_kPa=bias_kPa),
+    )
+    return made, force
+
+
+@pytest.mark.parametrize(("effects", "bias_kPa"), [(("dead_band",), 0.0), ((), 22.5)])
+def test_a_pressure_that_made_up_for_a_misfit_is_no_certain_pull_without_any(
+    effects: tuple[str, ...], bias_kPa: float
+) -> None:
+    """The model pulls or pushes there by newtons, and the remainder has ended."""
+    for seed in range(4):
+        specimen, true = tanh_muscle(seed, effects, bias_kPa)
+        model, draws = posterior_draws(specimen, specimen, Options(), seed, exact=False)
+        force = force_curves(model, draws, np.array([0.0, 25e3]), np.zeros(1), seed).force[:, :, 2, 0]
+        assert inside(force, np.array([true(P, np.zeros(1))[0] for P in (0.0, 25.0)])).all()
+
+
+def made(
+    levels_kPa: tuple[float, ...], options: Options | None = None, effects: tuple[str, ...] = ()
+) -> tuple[Model, Draws]:
     """Draws at the prior's middle but for a remainder of every shape, and no stroke's own."""
     law = "linear" if len(levels_kPa) > 1 else "constant"
-    specimen = build.specimen({"law": law}, build.loops(levels_kPa))
+    specimen = build.specimen({"law": law, "effects": effects}, build.loops(levels_kPa))
     model = build_model(draw_blueprint(specimen, options or Options()))
     u = np.zeros((DRAWS, len(model.names)))
     p, q, _ = model.linear_sizes
@@ -130,8 +180,8 @@ def test_nothing_comes_at_or_between_the_levels() -> None:
     assert beyond is not None
     for sign in (-1.0, 0.0, 1.0):
         rows = Readings.at_rest(np.linspace(1e5, 2e5, 21), 0.004, sign)
-        assert not beyond.force(rows).any()
-    near = beyond.force(Readings.at_rest(np.array([1e5 - 1.0, 2e5 + 1.0]), 0.004))
+        assert not beyond.force(rows, np.zeros((DRAWS, 21))).any()
+    near = beyond.force(Readings.at_rest(np.array([1e5 - 1.0, 2e5 + 1.0]), 0.004), np.zeros((DRAWS, 2)))
     size = draws.values["remainder_sd_N"][0, 0]
     assert 0.0 < np.abs(near).max() < 1e-3 * size
 
@@ -196,12 +246,17 @@ def test_without_a_remainder_nothing_is_added() -> None:
 
 
 def test_designs_are_given_the_same() -> None:
-    model, draws = made((100.0, 150.0, 200.0))
+    """Also where a dead-band below zero has the muscle pull without pressure."""
+    model, draws = made((100.0, 150.0, 200.0), effects=("dead_band",))
     draws = draws.thin(300)
+    draws = replace(draws, values=draws.values | {"P_DB_kPa": np.full((300, 1), -30e3)})
     g = model.setting.geometry
     own = np.array([g.R0, g.t0, g.alpha0])
     muscle = MuscleDraws.prepare(model, draws, 300, 5)
-    pressures = [25e3, 150e3, 300e3]
+    pressures = [0.0, 25e3, 150e3, 300e3]
     force = force_curves(model, draws, np.array(pressures), np.zeros(1), 5).force[:, :, 2, 0]
     for j, P in enumerate(pressures):
         assert muscle.blocked_forces(P, own) == pytest.approx(force[:, j], rel=1e-9)
+    # A design that no gas pulls has no remainder either.
+    weak = np.array([g.R0, g.t0, np.radians(30.0)])
+    assert np.isfinite(muscle.blocked_forces(25e3, weak)).all()
