@@ -71,10 +71,14 @@ def muscle_bands(
     unseen = past(furthest[:, None], grid) | reach.before(pressures[:, None], grid) | outside[:, None]
     parts = []
     for observed in (False, True):
-        curve = np.stack([each.curve for each in noise], axis=1) if observed else 0.0
+        curve = np.stack([each.curve for each in noise], axis=1) if observed else None
         suffix = "_observed" if observed else ""
         for j, branch in enumerate(BRANCHES):
-            table = _table(f"force_N{suffix}", pressures, grid, branch, curves.force[:, :, j] + curve)
+            force = curves.force[:, :, j]
+            if curve is not None:
+                # The same noise at each branch's own force, with which it may grow.
+                force = force + curve * curves.noise.growth(force)
+            table = _table(f"force_N{suffix}", pressures, grid, branch, force)
             told = recorded is None or recorded.tells(branch, model)
             table["extrapolated"] = unseen.ravel() if told else True
             if trim:
@@ -126,8 +130,8 @@ def _mean_free(free: Array, grid: Array) -> Array:
 class _Noise:
     """What new readings at one pressure add to N draws.
 
-    Along a curve (N, γ), to a blocked force (N,) and where the force is zero (N, 1), all in newtons; and to a
-    free contraction (N,).
+    Along a curve without force (N, γ), to a blocked force (N,) and where the force is zero (N, 1), all in
+    newtons; and to a free contraction (N,).
     """
 
     curve: Array
@@ -141,7 +145,7 @@ class _Noise:
         force = curves.force[:, j, 2]
         noise, zero = curves.noise, np.zeros((len(force), 1))
         return cls(
-            noise.draw(force, rng), noise.draw(force[:, 0], rng), noise.draw(zero, rng),
+            noise.unloaded(force.shape, rng), noise.draw(force[:, 0], rng), noise.draw(zero, rng),
             curves.contraction_noise * rng.standard_normal(len(force)),
         )  # fmt: skip
 

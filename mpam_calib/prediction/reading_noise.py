@@ -34,30 +34,36 @@ class ReadingNoise:
         """Standard deviation (N, ...), N, at forces (N, ...); of heavy-tailed noise, its scale."""
         white = self._white(force.ndim)
         correlated = self._correlated(force.ndim) if CORRELATED in self.values else 0.0
-        return np.asarray(np.hypot(white, correlated) * self._growth(force))
+        return np.asarray(np.hypot(white, correlated) * self.growth(force))
 
     def draw(self, force: Array, rng: np.random.Generator) -> Array:
         """One reading's noise (N, ...), N, at forces (N, ...)."""
-        normal = rng.standard_normal(force.shape)
+        return np.asarray(self.unloaded(force.shape, rng) * self.growth(force))
+
+    def unloaded(self, shape: tuple[int, ...], rng: np.random.Generator) -> Array:
+        """One reading's noise (N, ...), N, where there is no force."""
+        normal = rng.standard_normal(shape)
+        white = self._white(len(shape))
+        correlated = self._correlated(len(shape)) if CORRELATED in self.values else 0.0
         if FREEDOM not in self.values:
-            return self.sd(force) * normal
-        dof = np.broadcast_to(self._shaped(FREEDOM, force.ndim), force.shape)
-        tailed = np.clip(normal / np.sqrt(rng.chisquare(dof) / dof), -FURTHEST, FURTHEST)
-        white = self._white(force.ndim) * tailed
+            return np.asarray(np.hypot(white, correlated) * normal)
+        dof = np.broadcast_to(self._shaped(FREEDOM, len(shape)), shape)
+        tailed = white * np.clip(normal / np.sqrt(rng.chisquare(dof) / dof), -FURTHEST, FURTHEST)
         if CORRELATED in self.values:
-            white = white + self._correlated(force.ndim) * rng.standard_normal(force.shape)
-        return np.asarray(white * self._growth(force))
+            tailed = tailed + correlated * rng.standard_normal(shape)
+        return np.asarray(tailed)
+
+    def growth(self, force: Array) -> Array | float:
+        """Factor on that noise at forces (N, ...)."""
+        if GROWTH not in self.values:
+            return 1.0
+        return grown(self._shaped(GROWTH, force.ndim), force, self.force_scale)
 
     def _white(self, dimensions: int) -> Array:
         return np.asarray(self._shaped(WHITE, dimensions) / np.sqrt(self.averaged))
 
     def _correlated(self, dimensions: int) -> Array:
         return np.asarray(self._shaped(CORRELATED, dimensions) * self.lasting)
-
-    def _growth(self, force: Array) -> Array | float:
-        if GROWTH not in self.values:
-            return 1.0
-        return grown(self._shaped(GROWTH, force.ndim), force, self.force_scale)
 
     def _shaped(self, name: str, dimensions: int) -> Array:
         return self.values[name].reshape(-1, *(1,) * (dimensions - 1))

@@ -167,3 +167,22 @@ def test_noise_that_grows_with_the_force_is_that_of_the_blocked_force_at_full_le
     expected = NOISE * np.sqrt(1.0 + (2.0 * bare["mean"] / model.setting.force_scale) ** 2)
     assert expected > 1.5 * NOISE
     assert (seen["q95"] - seen["q05"]) / 3.29 == pytest.approx(expected, rel=0.07)
+
+
+def test_noise_that_grows_with_the_force_is_that_of_each_branch_s_own_force() -> None:
+    """Loading and unloading differ by half of the force in between, which friction adds and takes."""
+    model, draws = known()
+    assert model.setting is not None
+    more = {"noise_growth": 2.0, "K_f": 0.25}
+    draws = replace(draws, values=draws.values | {k: np.full((DRAWS, 1), v) for k, v in more.items()})
+    found = muscle_bands(model, draws, LEVELS[2:], 3)
+    found = found[found["contraction"] < 0.1]
+    wide = []
+    for branch in ("loading", "mean", "unloading"):
+        own = found[found["branch"] == branch]
+        bare, seen = (own[own["quantity"] == f"force_N{s}"].reset_index() for s in ("", "_observed"))
+        expected = NOISE * np.sqrt(1.0 + (2.0 * bare["mean"] / model.setting.force_scale) ** 2)
+        width = (seen["q95"] - seen["q05"]) / 3.29
+        assert (width / expected).mean() == pytest.approx(1.0, abs=0.03)
+        wide.append(width.mean())
+    assert wide[0] > 1.1 * wide[1] > 1.2 * wide[2]
