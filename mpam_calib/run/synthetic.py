@@ -39,8 +39,7 @@ def write_specimen(simulated: Simulated, source: Path, folder: Path) -> None:
     specimen = simulated.specimen
     keep_material(document, specimen, folder)
     if specimen.loops is not None:
-        files["loops"] = LOOPS
-        write_csv(_loops_table(specimen.loops, specimen.levels_Pa), folder / LOOPS)
+        files["loops"] = _write_loops(specimen.loops, specimen.levels_Pa, folder)
     if specimen.force_map is not None:
         files["force_map"] = FORCE_MAP
         write_csv(_map_table(specimen.force_map), folder / FORCE_MAP)
@@ -57,10 +56,11 @@ def write_specimen(simulated: Simulated, source: Path, folder: Path) -> None:
     write_json(truth, folder / TRUTH)
 
 
-def _loops_table(loops: Loops, levels: np.ndarray) -> pd.DataFrame:
-    return pd.DataFrame(
+def _write_loops(loops: Loops, levels: np.ndarray, folder: Path) -> str | list[str]:
+    """The names of the files: as many as were recorded, each on the clock on which its history begins."""
+    table = pd.DataFrame(
         {
-            "time_s": np.round(loops.time_s, 6),
+            "time_s": np.round(loops.time_s - loops.began_s, 6),
             "pressure_kPa": loops.pressure_Pa / KPA,
             "displacement_mm": loops.displacement_m / MM,
             "force_N": loops.force_N,
@@ -69,6 +69,11 @@ def _loops_table(loops: Loops, levels: np.ndarray) -> pd.DataFrame:
             "branch": pd.Series(loops.branch).map(WORDS).to_numpy(),
         }
     )
+    parts = [part for _, part in table.groupby(loops.clock)]
+    names = [f"loops_{i}_synthetic.csv" for i in range(1, len(parts) + 1)] if len(parts) > 1 else [LOOPS]
+    for part, name in zip(parts, names, strict=True):
+        write_csv(part, folder / name)
+    return names if len(parts) > 1 else LOOPS
 
 
 def _map_table(grid: ForceMap) -> pd.DataFrame:

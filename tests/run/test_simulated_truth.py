@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from mpam_calib.prediction.simulate import Simulated, _noise, simulate
+from mpam_calib.run.synthetic import write_specimen
 from mpam_calib.specimen import read
 
 from .command import Here
@@ -190,3 +191,26 @@ def test_noise_that_is_put_in_is_white_lasts_grows_and_has_tails_as_declared() -
     assert [part.std() for part in np.split(grown, 2)] == pytest.approx([0.3, 0.3 * np.sqrt(5.0)], rel=0.02)
     tailed = made(noise_sd_N=0.3, noise_dof=3.0)
     assert stats.kstest(tailed / 0.3, stats.t(3.0).cdf).pvalue > 1e-3
+
+
+def test_every_recording_keeps_its_own_clock(tmp_path: Path) -> None:
+    """Three files: the second's clock begins anew, and the third's goes on from it after half a minute."""
+    header, *rows = loops_text(rows=60).splitlines()
+    cells = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    parts = np.split(cells, 3)
+    for part, start in zip(parts, (40.0, 0.0, 42.0), strict=True):
+        part[:, 0] += start - part[0, 0]
+    folder = Specimen().write(tmp_path / "own", loops="")
+    toml = folder / "specimen.toml"
+    toml.write_text(toml.read_text().replace('"loops.csv"', '["a.csv", "b.csv", "c.csv"]'))
+    for name, part in zip("abc", parts, strict=True):
+        lines = [",".join(f"{cell:.8g}" for cell in row) for row in part]
+        (folder / f"{name}.csv").write_text("\n".join([header, *lines]) + "\n")
+    own = read(folder)
+    write_specimen(simulate(own, {"force_drift:tared": None}), toml, tmp_path / "made")
+    made = read(tmp_path / "made")
+    assert own.loops is not None and made.loops is not None
+    assert len(np.unique(made.loops.began_s)) == 2 and made.loops.clock.max() == 2
+    for name in ("time_s", "began_s", "clock", "stroke", "cycle", "level"):
+        assert getattr(made.loops, name) == pytest.approx(getattr(own.loops, name), abs=1e-5)
+    assert [file.name for file in made.files] == [f"loops_{i}_synthetic.csv" for i in (1, 2, 3)]
