@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,8 @@ AS_DECLARED = Options(remainder=False, nuisances=False)
 FITTED = Options(remainder=False)
 """What is fitted for it: an offset that the gauge is declared to have is not to end in the moduli."""
 NOISES = (WHITE, CORRELATED, TIME, GROWTH, FREEDOM)
+ROUNDS, SETTLED = 10, 1e-4
+"""Of a test without data at most, and the share by which its longest stroke may still change."""
 NOT_PUT_IN = (NOISE, CONTRACTION_SD)
 """Noise of files that are not simulated."""
 
@@ -51,6 +54,22 @@ class Simulated:
     hidden: dict[str, dict[str, float]]
     parameters: dict[str, float]
     not_shown: tuple[str, ...]
+
+
+class _Tested(NamedTuple):
+    """A specimen with loops, and what made them."""
+
+    specimen: Specimen
+    model: Model
+    hidden: dict[str, dict[str, float]]
+    values: dict[str, Array]
+    eta: Array
+
+    @property
+    def stroke(self) -> float:
+        """The longest, m."""
+        assert self.specimen.loops is not None
+        return float(self.specimen.loops.displacement_m.max())
 
 
 def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None, seed: int = 0) -> Simulated:
@@ -87,17 +106,12 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
         # What the declared simulation misses is no noise: that is told beside a remainder.
         beside, _ = _mode(specimen, blueprint.model_copy(update={"options": Options()}), rng)
         values |= {name: beside[name] for name in NOISES if name in beside}
+        model, hidden = with_hidden(blueprint, values, hide, specimen)
     else:
-        specimen = _tested(replace(specimen, levels_Pa=LEVELS))
-        blueprint = draw_blueprint(specimen, AS_DECLARED)
-        model = build_model(blueprint)
-        values, eta = _without_data(model)
-    model, hidden = with_hidden(blueprint, values, hide, specimen)
+        specimen, model, hidden, values, eta = _settled(replace(specimen, levels_Pa=LEVELS), hide)
     assert model.chain is not None
     eta = eta[:, : model.linear_sizes[0]]
     loops, grid = specimen.loops, specimen.force_map
-    if not fitted:
-        loops = _protocol(model, values, eta)
     floor = specimen.sensors.force_floor_N
     rows = [] if loops is None else [row_readings(loops)]
     rows += [] if grid is None else [_map_readings(grid, specimen)]
@@ -136,15 +150,25 @@ def _put_in(model: Model, values: dict[str, Array], eta: Array) -> dict[str, flo
     return {name: value for name, value in listed.items() if name not in NOT_PUT_IN}
 
 
-def _tested(specimen: Specimen) -> Specimen:
-    """With loops of the thesis's protocol: a hidden effect's size refers to a test's time and strokes."""
-    model = build_model(draw_blueprint(specimen, AS_DECLARED))
-    values, eta = _without_data(model)
+def _settled(specimen: Specimen, hide: Mapping[str, float | None]) -> _Tested:
+    """A test of the hidden effects whose sizes refer to that test: made anew until its strokes stay."""
+    test = _tested(specimen, {})
+    for _ in range(ROUNDS):
+        before, test = test.stroke, _tested(test.specimen, hide)
+        if abs(test.stroke - before) <= SETTLED * before:
+            break
+    return test
+
+
+def _tested(specimen: Specimen, hide: Mapping[str, float | None]) -> _Tested:
+    """The thesis's protocol; a hidden effect's size refers to the time and the strokes that there are."""
+    blueprint = draw_blueprint(specimen, AS_DECLARED)
+    values, eta = _without_data(build_model(blueprint))
+    model, hidden = with_hidden(blueprint, values, hide, specimen)
     loops = _protocol(model, values, eta)
     assert model.chain is not None
-    return replace(
-        specimen, loops=replace(loops, force_N=model.chain.force(values, eta, row_readings(loops))[0])
-    )
+    force = model.chain.force(values, eta, row_readings(loops))[0]
+    return _Tested(replace(specimen, loops=replace(loops, force_N=force)), model, hidden, values, eta)
 
 
 def _without_data(model: Model) -> tuple[dict[str, Array], Array]:

@@ -17,7 +17,7 @@ from mpam_calib.prediction.simulate import simulate
 from mpam_calib.specimen import read
 
 from .command import Here, contents, stamps
-from .small import MODULI, SIMULATION, Specimen, loops_text, static_force
+from .small import ALPHA0, L0, MODULI, R0, SIMULATION, Specimen, loops_text, static_force
 
 UNITS = {"dead_band": "kPa", "braid_angle": "°", "length_offset": "mm"}
 
@@ -90,6 +90,24 @@ def test_without_data_a_size_refers_to_the_test_that_is_made(tmp_path: Path) -> 
     half = plain.time_s.max() / 2.0
     out = (0.6 / 60.0) * half * np.sin(np.pi * plain.time_s / (2.0 * half))
     assert wandering.force_N - plain.force_N == pytest.approx(out, abs=0.01 * out.max())
+
+
+def test_without_data_a_size_refers_to_the_strokes_that_the_hidden_effect_leaves(tmp_path: Path) -> None:
+    """Conical ends: every contraction is longer by as much as rounded ones take at half of the stroke."""
+    simulation = '[simulation]\nmoduli = "tensile"\nE_Pa = [4.0e4, 2.6e4]\nfriction = "coulomb"\n'
+    specimen = read(Specimen(simulation=simulation).write(tmp_path / "own"), data_required=False)
+    made = simulate(specimen, {"tip_shape:tapered": 1.0})
+    loops, plain = made.specimen.loops, simulate(specimen).specimen.loops
+    assert loops is not None and plain is not None
+    half = loops.displacement_m.max() / 2.0
+    assert half < 0.8 * plain.displacement_m.max() / 2.0
+    turns_length = L0 / np.sin(np.radians(ALPHA0))
+    radius = np.sqrt(turns_length**2 - (L0 - 1e3 * half) ** 2) / np.sqrt(turns_length**2 - L0**2) * R0
+    taken = (np.pi - 2.0) * (radius - R0) / (1e3 * half)
+    contraction = (1.0 + taken) * 1e3 * loops.displacement_m / L0
+    free = static_force(loops.pressure_Pa / 1e3, contraction, ((0.0, 4.0e4), (0.0, 2.6e4)))
+    missed = loops.force_N - free - 0.0787 * np.abs(free) * loops.branch
+    assert np.sqrt(np.mean(missed**2)) == pytest.approx(0.25, rel=0.05)
 
 
 def test_an_effect_may_be_hidden_in_another_form(muscle: Path, tmp_path: Path, here: Here) -> None:
