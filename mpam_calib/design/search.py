@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -251,14 +251,17 @@ def hybrid(
     return Optimum(problem, start, tuple(refine(problem, start.x, method) for method in local))
 
 
-def to_bounds(problem: Problem, x: Array) -> Array:
-    """The design (SI) moved to a bound in one variable at a time, as long as that gains and is allowed.
+def to_bounds(problem: Problem, x: Array, shares: Sequence[float] = (1.0,)) -> Array:
+    """The design (SI) moved towards a bound in one variable at a time, as long as that gains and is allowed.
 
-    What a gradient search leaves undone where one variable hardly counts, or the objective has kinks.
+    By ``shares`` of the way to it, integers to whole ones. What a gradient search leaves undone where one
+    variable hardly counts, or the objective has kinks.
     """
     best, value = np.array(x), float(problem.objective(x))
+    bounds, whole = (problem.lower, problem.upper), list(problem.integers)
     while True:
-        moves = np.concatenate([best + np.diag(b - best) for b in (problem.lower, problem.upper)])
+        moves = np.concatenate([best + share * np.diag(b - best) for share in shares for b in bounds])
+        moves[:, whole] = np.rint(moves[:, whole])
         allowed = [problem.feasible(move) for move in moves]
         values = np.where(allowed, problem.objective(moves), -np.inf)
         i = int(np.argmax(values))

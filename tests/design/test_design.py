@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -82,6 +84,16 @@ def test_to_bounds_moves_what_gains_and_is_allowed() -> None:
     packed = case_one(P, packing=True)
     start = np.array([R, 0.8 * MM, ALPHA, 0.1 * MM, 75.0])
     assert packed.feasible(to_bounds(packed, start)) and to_bounds(packed, start)[4] == 100.0
+
+
+def test_part_of_the_way_to_bounds_kinks_are_found_and_integers_stay_whole() -> None:
+    problem = replace(
+        case_one(P), objective=lambda x: -np.abs(x[..., 4] - 80.0) - np.abs(x[..., 1] / MM - 1.1)
+    )
+    start = np.array([R, 0.8 * MM, ALPHA, 2.4 * MM, 45.0])
+    x = to_bounds(problem, start, [0.5**k for k in range(12)])
+    assert x[4] == 80.0 and x[1] == pytest.approx(1.1 * MM, rel=1e-3)
+    assert x[[0, 2, 3]] == pytest.approx(start[[0, 2, 3]])
 
 
 def test_multipliers_are_the_derivatives_of_the_optimum() -> None:

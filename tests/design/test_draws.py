@@ -10,6 +10,7 @@ import pytest
 from mpam_calib.design import robust
 from mpam_calib.design.draws import MuscleDraws
 from mpam_calib.design.optimality import ActiveConstraint, Optimality
+from mpam_calib.design.problem import case_one, case_two
 from mpam_calib.design.robust import COLUMNS, Design, Optimiser, designs_table
 from mpam_calib.model.blueprint import Blueprint, Options
 from mpam_calib.model.model import Model, build_model
@@ -167,6 +168,23 @@ def test_careful_design_is_no_worse_in_what_it_is_careful_about() -> None:
     assert np.quantile(found["II", "q05"].force, 0.05) > np.quantile(
         found["II", "posterior_mean"].force, 0.05
     )
+
+
+def test_no_variable_alone_gains_in_the_careful_design() -> None:
+    """Its aim has a kink wherever another draw becomes the one in twenty."""
+    made = model(0.5, strain="stretch")
+    draws = point(made, 200)
+    eta = np.random.default_rng(2).standard_normal(draws.eta.shape)
+    optimiser = Optimiser(made, Draws(draws.u, draws.values, eta, 1))
+    careful = {d.case: d for d in optimiser.at(P) if d.method == "q05"}
+    for case, problem in (("I", case_one(P)), ("II", case_two(P))):
+        best = careful[case]
+        for i in (0, 1, 2):
+            along = np.tile(best.x, (400, 1))
+            along[:, i] = np.linspace(problem.lower[i], problem.upper[i], 400)
+            along = along[[problem.feasible(x) for x in along]]
+            aim = np.quantile(optimiser.many.blocked_forces(P, along), 0.05, axis=-1)
+            assert aim.max() < 1.001 * np.quantile(best.force, 0.05)
 
 
 def test_remainder_keeps_its_share_of_the_gas_force() -> None:
