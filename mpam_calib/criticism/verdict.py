@@ -38,7 +38,8 @@ its root mean square as a share of a reading's noise: the tests suppose that the
 class Verdict:
     """The word, the leading set, and every set with its probability (best first).
 
-    ``standing`` are the causes that hold even beside a remainder; the leading set leaves the ``faults``;
+    ``standing`` are the causes that hold even beside a remainder; the leading set leaves the ``faults``, and
+    ``left`` is whether it leaves anything that no set removes;
     ``load_cell`` is a load cell at fault that comes near
     that set; ``trace`` what that set's residuals still depend on; ``unseen`` are the sets with one cause more
     that the data do not exclude, unless structure is left that would pass for it.
@@ -50,6 +51,7 @@ class Verdict:
     probabilities: dict[Set, float]
     marginals: dict[str, float]
     faults: Faults = FAULTLESS
+    left: bool = False
     load_cell: Rival | None = None
     trace: Structure | None = None
     unseen: frozenset[Set] = frozenset()
@@ -96,7 +98,7 @@ def judge(found: Search) -> Verdict:
         if gives_way:
             standing &= rival.beside
         standing = _outweighing(found, standing)
-        held = Verdict("unexplained", leading, standing, probabilities, marginals, faults, trace=trace)
+        held = Verdict("unexplained", leading, standing, probabilities, marginals, faults, left, trace=trace)
         return replace(held, load_cell=rival) if gives_way else held
     if nothing:
         unseen = _unseen(found, frozenset())

@@ -10,7 +10,7 @@ import pandas as pd
 
 from mpam_calib.criticism.diagnose import Diagnosis
 from mpam_calib.criticism.fitting.fit import by_equations
-from mpam_calib.criticism.verdict import BESIDE, TRACE, TRACE_SIZE
+from mpam_calib.criticism.verdict import BESIDE, TRACE, TRACE_SIZE, Verdict
 from mpam_calib.model.bend import FORM, is_bend
 from mpam_calib.model.effect import effect
 from mpam_calib.model.priors import Parameter
@@ -53,7 +53,7 @@ BENT = (
 def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen) -> Page:
     """The page for one diagnosis; ``content`` is that of ``diagnosis.json``."""
     causes, parameters, tested = content["causes"], _parameters(found), found.candidates.tested
-    lead = first_screen(content, specimen)
+    lead = first_screen(content | _beyond_the_file(found.verdict), specimen)
     sections = [
         Section("Misfit budget", _budget(found, content)),
         Section("Where the misfit shows", _structure(content)),
@@ -69,6 +69,12 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
         Section("Simulation", [Text(wording.simulation_sentence(specimen.simulation))]),
     ]
     return Page(specimen.name, "Diagnosis: what the simulation gets wrong", lead, sections)
+
+
+def _beyond_the_file(verdict: Verdict) -> dict[str, Any]:
+    """What the first screen says that ``diagnosis.json`` has no key for."""
+    likely = verdict.probabilities.get(verdict.leading, 0.0)
+    return {"left": verdict.left, "leading": {"ids": sorted(verdict.leading), "probability": likely}}
 
 
 def _structure(content: dict[str, Any]) -> list[Block]:
@@ -98,17 +104,18 @@ def _budget(found: Diagnosis, content: dict[str, Any]) -> list[Block]:
     newtons = [misfit_before * float(np.sqrt(max(c["share_of_misfit"], 0.0))) for c in content["causes"]]
     left = content["misfit_after_N"]
     problem, search = found.problem, found.search
-    standing = found.verdict.standing
     # By its equations, as the bars: what a doubt about them adds would hide, or make, structure.
-    before, after = (by_equations(problem, search.fits[s, 0]) for s in (frozenset[str](), standing))
+    shown = {
+        title: problem.force - by_equations(problem, search.fits[effects, 0])
+        for title, effects in _compared(found).items()
+    }
     middle = problem.middle()
     assert problem.model.setting is not None
     maps = misfit.residual_maps(
         middle.displacement / problem.model.setting.geometry.L0,
         middle.sign,
         problem.model.setting.levels[problem.level] / KPA,
-        problem.force - before,
-        problem.force - after,
+        shown,
         float(np.sqrt(np.median(np.diagonal(problem.noise)))),
     )
     return [
@@ -121,9 +128,20 @@ def _budget(found: Diagnosis, content: dict[str, Any]) -> list[Block]:
             maps,
             "Reduced readings minus the refitted simulation; grey: twice the noise of a reduced reading. "
             "Triangles up: loading, down: unloading.",
-            "Residuals before and after",
+            f"Residuals: {', '.join(shown)}",
         ),
     ]
+
+
+def _compared(found: Diagnosis) -> dict[str, frozenset[str]]:
+    """Whose residuals are drawn, by their titles: where nothing is named, those of what comes nearest."""
+    declared, standing, leading = frozenset[str](), found.verdict.standing, found.verdict.leading
+    compared = {"declared simulation": declared}
+    if standing:
+        return compared | {"with the causes named": standing}
+    if leading and (leading, 0) in found.search.fits:
+        compared["with the likeliest set, which is not named"] = leading
+    return compared
 
 
 def _parameters(found: Diagnosis) -> dict[str, Parameter]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Literal
 
 from markupsafe import Markup
 
+from mpam_calib.criticism.verdict import LEAD
 from mpam_calib.model.effect import effect
 from mpam_calib.report import wording
 from mpam_calib.report.numbers import probability, significant
@@ -29,6 +31,12 @@ SENTENCES = {
 RECORDING = (
     "The recording {} at fault: before that is put right nothing can be said of the declared simulation."
 )
+UNDECIDED = "These data cannot tell a wrong simulation from a load cell at fault."
+PARTLY_UNDECIDED = (
+    "The declared simulation is wrong, but these data cannot tell all that is wrong with it from a load cell "
+    "at fault."
+)
+CELL = "A load cell at fault explains these data better than any known set of causes does."
 DOUBTED = "No fault is shown beyond doubt, but {}: see “What else could it be”."
 
 COVERED = 0.75
@@ -51,7 +59,10 @@ def _noise(content: dict[str, Any]) -> str:
 
 
 def first_screen(content: dict[str, Any], specimen: Specimen) -> list[Block]:
-    """Headline, verdict with its reasons, key numbers, what to beware of; ``content`` is diagnosis.json's."""
+    """Headline, verdict with its reasons, key numbers, what to beware of.
+
+    ``content`` is that of diagnosis.json, with the ``leading`` set and whether it leaves anything (``left``).
+    """
     lead: list[Block] = [
         Headline(_headline(content)),
         _verdict(content),
@@ -74,7 +85,21 @@ def _headline(content: dict[str, Any]) -> str:
         return DOUBTED.format(_rivalry(rival, content["probability"]))
     if word == "unexplained" and only_recording(content):
         return RECORDING.format(_sure_of_fault(content))
+    if word == "unexplained" and _undecided(content):
+        if _of_the_cell(content):
+            return CELL
+        return PARTLY_UNDECIDED if content["causes"] else UNDECIDED
     return SENTENCES[word]
+
+
+def _undecided(content: dict[str, Any]) -> bool:
+    """Whether the likeliest set leaves nothing, and only a load cell at fault keeps it from its name."""
+    return content["load_cell"] is not None and not content["left"]
+
+
+def _of_the_cell(content: dict[str, Any]) -> bool:
+    """Whether a load cell at fault is clearly likelier than the likeliest set."""
+    return float(content["load_cell"]["nats"]) > LEAD
 
 
 def _sure_of_fault(content: dict[str, Any]) -> str:
@@ -104,9 +129,13 @@ def _verdict(content: dict[str, Any]) -> Verdict:
     word, reasons = content["verdict"], _reasons(content)
     if word == "adequate" and (rival := _likelier(content)):
         said = f"{probability(rival['probability'])}, of no cause {probability(content['probability'])}"
-        titles = " and ".join(effect(e).title.lower() for e in rival["ids"])
+        titles = _titles(rival["ids"])
         return Verdict("Adequate, with a doubt.", "caution", [f"probability of {titles}: {said}", *reasons])
     return Verdict(_verdict_sentence(content), LEVELS[word], reasons)
+
+
+def _titles(ids: Iterable[str]) -> str:
+    return " and ".join(effect(e).title.lower() for e in ids)
 
 
 def _verdict_sentence(content: dict[str, Any]) -> str:
@@ -115,6 +144,9 @@ def _verdict_sentence(content: dict[str, Any]) -> str:
         return "Adequate."
     if content["verdict"] == "unexplained" and only_recording(content):
         return f"Unexplained: the recording {_sure_of_fault(content)} at fault."
+    if content["verdict"] == "unexplained" and not titles and _undecided(content):
+        either = "" if _of_the_cell(content) else f"{_titles(content['leading']['ids'])}, or "
+        return f"Unexplained: {either}a load cell at fault."
     if not titles:
         return f"{content['verdict'].capitalize()}: no cause stands by itself."
     return f"{content['verdict'].capitalize()}: {titles}."
@@ -126,13 +158,22 @@ def _reasons(content: dict[str, Any]) -> list[str]:
         for c in content["causes"]
     ]
     if content["verdict"] == "unexplained":
-        reasons += unremoved(content)
+        reasons += [*_kept_from_its_name(content), *unremoved(content)]
     reasons += [
         f"{effect(c['id']).title} stays inside twice its declared uncertainty"
         for c in content["causes"]
         if c["within_declared_uncertainty"]
     ]
     return reasons
+
+
+def _kept_from_its_name(content: dict[str, Any]) -> list[str]:
+    """The set that explains the readings, where it is a load cell alone that keeps it from its name."""
+    if not _undecided(content) or only_recording(content):
+        return []
+    leading = content["leading"]
+    titles, told = _titles(leading["ids"]), probability(leading["probability"])
+    return [f"the likeliest set of causes leaves nothing beyond the noise: {titles} (probability {told})"]
 
 
 def _assumed(content: dict[str, Any]) -> list[str]:

@@ -55,6 +55,7 @@ def test_a_cause_that_leaves_more_than_there_was_is_not(problem: Problem) -> Non
     assert np.argmax([found.score(s) for s in (NOTHING, CAUSE)]) == 1
     verdict = judge(found)
     assert (verdict.word, verdict.standing) == ("unexplained", NOTHING)
+    assert verdict.left
 
 
 @pytest.mark.parametrize(("size", "word"), [(1.0, "unexplained"), (0.1, "named")])
@@ -269,6 +270,7 @@ def test_a_load_cell_that_comes_near_takes_the_name_and_what_it_replaces(
     verdict = judge(found)
     assert (verdict.word, verdict.standing) == (word, standing)
     assert verdict.load_cell == (None if word == "named" else rival)
+    assert not verdict.left  # by the set that leads
 
 
 def test_a_part_that_no_climb_can_fit_does_not_end_a_diagnosis(

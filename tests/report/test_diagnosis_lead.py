@@ -1,13 +1,18 @@
-"""The first screen of a diagnosis: how sure "adequate" is."""
+"""The first screen of a diagnosis: how sure "adequate" is, and what a load cell leaves open."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from criticism.test_hypotheses import specimen_of
 
+from mpam_calib.criticism.unexplained.load_cell import FAULT
+from mpam_calib.report.diagnosis import _compared
 from mpam_calib.report.diagnosis_lead import first_screen
+from mpam_calib.report.figures.misfit import residual_maps
 from mpam_calib.report.page import Headline, Verdict
 
 CONTENT: dict[str, Any] = {
@@ -43,3 +48,61 @@ def test_adequate_is_green_only_where_no_cause_is_more_probable(
     assert said in headline.html
     assert ("show no fault" in headline.html) == (level == "good")
     assert any("of no cause" in reason for reason in verdict.reasons) == (level == "caution")
+
+
+UNEXPLAINED: dict[str, Any] = CONTENT | {
+    **dict.fromkeys(("saturated_share", "repeating_N", "bursts_N", "hum_N", "step_N", "chatter_N"), 0.0),
+    "verdict": "unexplained",
+    "misfit_before_N": 1.3,
+    "misfit_after_N": 1.3,
+    "remainder_N": 2.0,
+    "trace": None,
+    "alternatives": [],
+    "probability": 0.0,
+    "leading": {"ids": ["braid_angle"], "probability": 0.964},
+}
+CREEP = {"id": "creep", "probability": 0.99, "within_declared_uncertainty": False}
+
+
+@pytest.mark.parametrize(
+    ("nats", "left", "causes", "headline", "verdict"),
+    [
+        (-2.3, False, [], "cannot tell a wrong simulation from a load cell", "braid angle, or a load cell"),
+        (-2.3, True, [], "in a way that no known set of causes removes", "no cause stands by itself"),
+        (None, True, [], "in a way that no known set of causes removes", "no cause stands by itself"),
+        (9.0, False, [], "A load cell at fault explains these data better", "Unexplained: a load cell at"),
+        (-2.3, False, [CREEP], "is wrong, but these data cannot tell all", "Unexplained: creep."),
+    ],
+)
+def test_a_set_that_only_a_load_cell_rivals_is_told(
+    nats: float | None, left: bool, causes: list[dict[str, Any]], headline: str, verdict: str
+) -> None:
+    size = {"cell_knee_N": {"mean": 3.6}}
+    cell = None if nats is None else {"fault": FAULT, "nats": nats, "parameters": size}
+    content = UNEXPLAINED | {"load_cell": cell, "left": left, "causes": causes}
+    said, box = first_screen(content, specimen_of("develop-null-006"))[:2]
+    assert isinstance(said, Headline) and isinstance(box, Verdict)
+    assert headline in said.html and verdict in box.sentence
+    assert any("leaves nothing beyond the noise: braid angle" in r for r in box.reasons) == (not left)
+
+
+@pytest.mark.parametrize(
+    ("standing", "leading", "second"),
+    [
+        (["creep"], ["creep", "dead_band"], ["with the causes named"]),
+        ([], ["creep"], ["with the likeliest set, which is not named"]),
+        ([], [], []),
+    ],
+)
+def test_residuals_are_drawn_of_what_their_titles_say(
+    standing: list[str], leading: list[str], second: list[str]
+) -> None:
+    found: Any = SimpleNamespace(
+        verdict=SimpleNamespace(standing=frozenset(standing), leading=frozenset(leading)),
+        search=SimpleNamespace(fits={(frozenset(leading), 0): None}),
+    )
+    compared = _compared(found)
+    assert list(compared) == ["declared simulation", *second]
+    place, same = np.linspace(0.0, 0.3, 20), np.ones(20)
+    figure = residual_maps(place, same, np.repeat([5.0, 9.0], 10), dict.fromkeys(compared, same), 1.0)
+    assert [ax.get_title(loc="left") for ax in figure.axes] == list(compared)

@@ -1,7 +1,8 @@
-"""The misfit budget as one bar, and residuals before and after the repair."""
+"""The misfit budget as one bar, and what simulations with and without causes leave of the readings."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,16 +35,15 @@ def budget(names: list[str], newtons: list[float], noise: float) -> Figure:
 
 
 def residual_maps(
-    contraction: Floats, sign: Floats, level_kPa: Floats, before: Floats, after: Floats, noise: float
+    contraction: Floats, sign: Floats, level_kPa: Floats, residuals: Mapping[str, Floats], noise: float
 ) -> Figure:
-    """Reading minus model against contraction, before and after, one colour a level."""
+    """Reading minus model against contraction, a panel for each of the ``residuals``, one colour a level."""
     levels = sorted(set(np.round(level_kPa, 1).tolist()))
     colours = style.level_colours(levels)
     with style.applied():
         figure = style.new_figure(3.4)
-        axes = figure.subplots(1, 2, sharey=True)
-        titles = ("declared simulation", "with the causes named")
-        for ax, values, title in zip(axes, (before, after), titles, strict=True):
+        axes = figure.subplots(1, len(residuals), sharey=True, squeeze=False)[0]
+        for ax, (title, values) in zip(axes, residuals.items(), strict=True):
             for level in levels:
                 for branch, marker in ((1.0, "^"), (-1.0, "v"), (0.0, "o")):
                     rows = (np.round(level_kPa, 1) == level) & (np.sign(sign) == branch)
