@@ -43,7 +43,7 @@ def diagnose_to_folder(
     if kept.finished():
         return None
     demand_writable(run)
-    _demand_extended(source, run)
+    _demand_extended(source, run, files)
     demand_forces(specimen, "one to diagnose")
     tell_replaced(run, "diagnosis")
     with kept.unfinished.resumable():
@@ -58,14 +58,15 @@ def diagnose_to_folder(
     return found
 
 
-def _demand_extended(source: Path, run: Path) -> None:
+def _demand_extended(source: Path, run: Path, files: tuple[str, ...]) -> None:
     """Raise ``InputError`` where the extended specimen would be written over another, or its own source."""
     extended = run / EXTENDED
     folder = source if source.is_dir() else source.parent
     if folder.resolve().is_relative_to(extended.resolve()):
         raise InputError(run, f"the folder whose {EXTENDED}/ is diagnosed", "another for these results")
-    own = any((run / name).exists() for name in (KEPT_FILE, "diagnosis.json", UNFINISHED))
-    if (extended / SPECIMEN_FILE).exists() and not own:
+    own = any((run / name).exists() for name in (KEPT_FILE, UNFINISHED))
+    others = any((run / name).exists() for name in files if name.startswith(f"{EXTENDED}/"))
+    if others and not own:
         raise InputError(extended, "a specimen that no diagnosis wrote", "another folder for these results")
 
 

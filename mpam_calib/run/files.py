@@ -27,13 +27,14 @@ OWNERS = {
     KEPT_FILE: "a diagnosis's or selection's folder",
     REPRODUCTION: "a reproduction's folder",
 }
-GENERIC = ("summary.csv", "bands.csv", "report.html")
-"""Results whose names others use as well ..."""
-OURS = (
-    RUN_FILE, KEPT_FILE, POSTERIOR, CHECKPOINT, UNFINISHED,
-    "diagnosis.json", "models.csv", REPRODUCTION,
+GENERIC = (
+    "summary.csv", "bands.csv", POSTERIOR, "report.html",
+    "predictions.csv", "designs.csv", "designs.html",
+    "models.csv", "prior_sensitivity.csv", "diagnosis.json",
 )  # fmt: skip
-"""... beside one of which they are ours, finished or not."""
+"""All that a command writes into such a folder, or removes from it: others use these names as well ..."""
+MARKS = (RUN_FILE, KEPT_FILE, CHECKPOINT, UNFINISHED, REPRODUCTION)
+"""... and they are ours beside one of these, of which there is always one, finished or not."""
 
 
 def demand_folder(path: Path, *replaces: str) -> None:
@@ -56,7 +57,7 @@ def demand_own(path: Path, *replaces: str) -> None:
         if name not in replaces and (path / name).exists():
             raise InputError(path, owner, "one of its own for these results")
     others = [name for name in GENERIC if (path / name).exists()]
-    if others and not any((path / name).exists() for name in OURS):
+    if others and not any((path / name).exists() for name in MARKS):
         raise InputError(path / others[0], "a file that no run wrote", "a new folder for these results")
 
 

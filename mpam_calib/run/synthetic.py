@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import tomlkit
 
+from mpam_calib.errors import InputError
 from mpam_calib.posterior.chains.checkpoint import write_atomically
 from mpam_calib.posterior.material import keep_material
 from mpam_calib.prediction.simulate import Simulated
@@ -18,13 +19,17 @@ from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 from mpam_calib.units import KPA, MM
 
 WORDS = {code: word for word, code in BRANCH_WORDS.items()}
-LOOPS, FORCE_MAP = "loops_synthetic.csv", "force_map_synthetic.csv"
+LOOPS, FORCE_MAP, TENSILE = "loops_synthetic.csv", "force_map_synthetic.csv", "tensile.csv"
 TRUTH = "truth.json"
 
 
 def demand_synthetic_folder(path: Path) -> None:
     """Raise ``InputError`` where a synthetic specimen cannot be written; only another one is replaced."""
-    demand_folder(path, *([SPECIMEN_FILE] if (path / TRUTH).exists() else []))
+    ours = all((path / name).exists() for name in (SPECIMEN_FILE, TRUTH))
+    demand_folder(path, *([SPECIMEN_FILE] if ours else []))
+    others = [name for name in (TENSILE, TRUTH) if (path / name).exists()]
+    if others and not ours:
+        raise InputError(path / others[0], "a file that no simulation wrote", "a new folder for these data")
 
 
 def write_specimen(simulated: Simulated, source: Path, folder: Path) -> None:
@@ -44,9 +49,9 @@ def write_specimen(simulated: Simulated, source: Path, folder: Path) -> None:
         files["force_map"] = FORCE_MAP
         write_csv(_map_table(specimen.force_map), folder / FORCE_MAP)
     if specimen.tensile is not None:
-        files["tensile"] = "tensile.csv"
+        files["tensile"] = TENSILE
         tensile = pd.DataFrame({"strain": specimen.tensile.strain, "stress_Pa": specimen.tensile.stress_Pa})
-        write_csv(tensile, folder / "tensile.csv")
+        write_csv(tensile, folder / TENSILE)
     document["files"] = files
     text = "# SYNTHETIC: made by a simulation, not by a rig.\n" + tomlkit.dumps(document)
     write_atomically(folder / SPECIMEN_FILE, lambda p: p.write_text(text, encoding="utf-8"))

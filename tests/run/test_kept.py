@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from mpam_calib.run import diagnose, select
 from mpam_calib.run import folder as run_folder
+from mpam_calib.run.files import MARKS
 from mpam_calib.run.kept import Kept
 
 from .command import FAST, RESULTS, Here, contents, stamps
@@ -63,6 +65,38 @@ def test_what_others_left_is_not_written_over(
     assert contents(others) == {"report.html": b"mine"}
 
 
+WRITTEN = {
+    "calibrate": (*run_folder.WRITTEN, *run_folder.DERIVED),
+    "select": select.FILES,
+    "diagnose": diagnose.FILES,
+}
+OF_OTHERS = [(command, name) for command, names in WRITTEN.items() for name in names if name not in MARKS]
+
+
+@pytest.mark.parametrize(("command", "name"), OF_OTHERS)
+def test_no_file_of_others_is_written_over_or_removed(
+    muscle: Path, tmp_path: Path, here: Here, command: str, name: str
+) -> None:
+    """Whatever a command writes, or takes away with an older result, its own mark has to stand beside it."""
+    others = tmp_path / "others"
+    (others / name).parent.mkdir(parents=True)
+    (others / name).write_text("mine")
+    result = here(command, muscle, "-o", others)
+    assert result.code == 2
+    assert "that no run wrote" in result.err or "that no diagnosis wrote" in result.err
+    assert contents(others) == {name: b"mine"}
+
+
+def test_nor_are_data_beside_which_a_diagnosis_would_extend_them(
+    muscle: Path, tmp_path: Path, here: Here
+) -> None:
+    own = tmp_path / "run" / "extended" / "loops.csv"
+    own.parent.mkdir(parents=True)
+    own.write_text("mine")
+    assert "that no diagnosis wrote" in here("diagnose", muscle, "-o", tmp_path / "run").complaint
+    assert own.read_text() == "mine"
+
+
 @pytest.mark.parametrize("command", ["calibrate", "select", "diagnose"])
 def test_nothing_goes_into_the_folder_of_a_reproduction(
     own_material: Path, tmp_path: Path, here: Here, command: str
@@ -78,8 +112,11 @@ def test_nothing_goes_into_the_folder_of_a_reproduction(
     assert contents(repro) == before
 
 
-def test_a_run_without_its_mark_is_still_a_run(own_material: Path, own_run: Path, here: Here) -> None:
+def test_a_run_that_was_killed_while_it_wrote_is_still_a_run(
+    own_material: Path, own_run: Path, here: Here
+) -> None:
     (own_run / "run.json").unlink()
+    (own_run / "checkpoint").mkdir()
     assert here("calibrate", own_material, "-o", own_run, *FAST).code in (0, 3)
     assert state(own_run)
 

@@ -14,6 +14,7 @@ import pytest
 
 from mpam_calib.posterior.material import material_of
 from mpam_calib.prediction.simulate import simulate
+from mpam_calib.run.synthetic import demand_synthetic_folder
 from mpam_calib.specimen import read
 
 from .command import Here, contents, stamps
@@ -39,6 +40,20 @@ def test_a_size_that_a_rig_may_have_is_hidden_and_told(muscle: Path, tmp_path: P
     assert here("simulate", muscle, "-o", tmp_path / "made", "--hide", "dead_band=7.5").code == 0
     truth = json.loads((tmp_path / "made" / "truth.json").read_text())
     assert truth["hidden"]["dead_band"] == {"P_DB_kPa": 7.5}
+
+
+@pytest.mark.parametrize("name", ["tensile.csv", "truth.json"])
+def test_files_that_no_simulation_wrote_are_left_alone(
+    muscle: Path, tmp_path: Path, here: Here, name: str
+) -> None:
+    made = tmp_path / "made"
+    made.mkdir()
+    (made / name).write_text("mine")
+    assert f"{name}: found a file that no simulation wrote" in here("simulate", muscle, "-o", made).complaint
+    assert contents(made) == {name: b"mine"}
+    for ours in ("specimen.toml", "truth.json"):
+        (made / ours).touch()
+    demand_synthetic_folder(made)
 
 
 def test_the_truth_holds_all_that_was_put_in_under_the_summary_s_names(muscle: Path) -> None:
