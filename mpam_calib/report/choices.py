@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pandas as pd
 
 from mpam_calib.report.numbers import probability, superscript
@@ -87,19 +88,19 @@ def level_sentence(levels: pd.DataFrame, model: str) -> str:
     if not len(rows):
         return ""
     off = rows[rows["bias_N"].abs() > AWAY * rows["bias_sd_N"]]
-    ends = ", ".join(f"{p:.0f} kPa" for p in rows.loc[rows["extrapolated"], "pressure_kPa"])
+    ends = ", ".join(f"{p:.4g} kPa" for p in rows.loc[rows["extrapolated"], "pressure_kPa"])
     said = "; ".join(
-        f"{row['pressure_kPa']:.0f} kPa by {row['bias_N']:.2g} N (expected sd {row['bias_sd_N']:.2g} N)"
+        f"{row['pressure_kPa']:.4g} kPa by {row['bias_N']:.2g} N (expected sd {row['bias_sd_N']:.2g} N)"
         for _, row in off.iterrows()
     )
     verdict = (
         f"it misses {said}" if said else "no level's mean is missed by more than two standard deviations"
     )
-    inside = rows["inside90"].mean()
+    inside = np.average(rows["inside90"], weights=rows["rows"])  # levels differ in how many rows they have
     return (
         f"Each level predicted from all others by {WHOSE[model]}: {verdict}; root mean square errors are "
         f"{rows['rmse_N'].min():.2g} to {rows['rmse_N'].max():.2g} N, and {inside:.0%} of the rows "
-        f"lie inside their 90 % bands ({ends} extrapolated)."
+        f"lie inside their 90 % bands{f' ({ends} extrapolated)' if ends else ''}."
     )
 
 
@@ -119,7 +120,7 @@ def choices_section(odds: pd.DataFrame, levels: pd.DataFrame) -> Section:
             )
         )
     if len(levels):
-        formats = {"pressure_kPa": "{:.0f}", "inside90": "{:.2f}"}
+        formats = {"pressure_kPa": "{:.4g}", "inside90": "{:.2f}"}
         formats |= dict.fromkeys(("rmse_N", "bias_N", "bias_sd_N"), "{:.3g}")
         blocks.append(DataTable(levels, "Levels predicted from the others", formats, collapse=True))
     return Section(

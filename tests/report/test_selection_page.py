@@ -14,7 +14,7 @@ from mpam_calib.criticism.selection.held_out import LEVEL_COLUMNS
 from mpam_calib.criticism.selection.odds import odds
 from mpam_calib.criticism.selection.select import COLUMNS, Selection
 from mpam_calib.model.blueprint import MaterialPosterior
-from mpam_calib.report.choices import choice_sentences
+from mpam_calib.report.choices import choice_sentences, choices_section, level_sentence
 from mpam_calib.report.page import DataTable, Headline, Notice, Page, Text, Verdict
 from mpam_calib.report.selection import evidence_text, ranking_table, selection_page, selection_sentence
 from mpam_calib.specimen.declaration import GeometrySd, Sensors
@@ -242,3 +242,23 @@ def test_each_model_stands_apart_from_its_odds() -> None:
     said = " ".join(choice_sentences(table, "order"))
     assert "M = 2 (1 to 10⁴)" in said or "M = 2 (1 to 22026)" in said
     assert "M = 2 against 1 (" in said
+
+
+def levels_of(*rows: tuple[float, int, float, bool]) -> pd.DataFrame:
+    """Levels left out: pressure, rows, the share inside, and whether it is extrapolated."""
+    table = [("first", p, n, 1.0, 0.1, 0.2, inside, beyond) for p, n, inside, beyond in rows]
+    return pd.DataFrame(table, columns=["model", *LEVEL_COLUMNS])
+
+
+def test_the_share_of_rows_inside_counts_rows_and_not_levels() -> None:
+    said = level_sentence(levels_of((2.5, 10, 0.0, True), (50.0, 90, 1.0, False)), "first")
+    assert "90% of the rows" in said and "(2.5 kPa extrapolated)" in said
+
+
+def test_low_levels_keep_their_decimals_and_nothing_is_extrapolated_where_no_level_is() -> None:
+    levels = levels_of((2.5, 10, 0.9, False), (50.0, 90, 0.9, False)).assign(bias_N=1.0)
+    said = level_sentence(levels, "first")
+    assert "it misses 2.5 kPa by 1 N" in said and "extrapolated" not in said
+    choices = odds(models(UNKNOWN), SPECIMEN.simulation)
+    (table,) = (b for b in choices_section(choices, levels).blocks if isinstance(b, DataTable))
+    assert [row[1] for row in table.rows] == ["2.5", "50"]
