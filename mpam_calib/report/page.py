@@ -12,7 +12,7 @@ import os
 import re
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -85,6 +85,10 @@ class Page:
     lead: Sequence[Block]
     sections: Sequence[Section]
     footer: str = ""
+
+    def under(self, notice: str) -> Page:
+        """The page with a notice above all else; as it is without one ("")."""
+        return replace(self, lead=[Notice(notice), *self.lead]) if notice else self
 
     def render(self) -> str:
         """The page as HTML text without any reference to the outside."""

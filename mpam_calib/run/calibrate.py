@@ -63,7 +63,7 @@ def calibrate_to_folder(
     material = material_of(specimen)
     options = options or Options()
     digest = run_digest(
-        specimen.digest,
+        specimen,
         command="calibrate",
         seed=seed,
         options=options.model_dump(),

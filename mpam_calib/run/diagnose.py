@@ -17,6 +17,7 @@ from mpam_calib.report.diagnosis import diagnosis_page
 from mpam_calib.run.files import KEPT_FILE, UNFINISHED, demand_forces, demand_own, demand_writable, write_json
 from mpam_calib.run.folder import run_digest
 from mpam_calib.run.kept import Kept
+from mpam_calib.run.provenance import provenance
 from mpam_calib.run.replaced import tell_replaced
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
@@ -37,7 +38,7 @@ def diagnose_to_folder(
     demand_own(run, RUN_FILE, KEPT_FILE)
     demand_other(specimen, run)
     material = material_of(specimen)
-    digest = run_digest(specimen.digest, command="diagnose", seed=seed, material=material)
+    digest = run_digest(specimen, command="diagnose", seed=seed, material=material)
     files = (*FILES, *(f"{EXTENDED}/{file.name}" for file in specimen.files))
     kept = Kept(run, "diagnose", digest, files)
     if kept.finished():
@@ -52,7 +53,7 @@ def diagnose_to_folder(
     toml = source / SPECIMEN_FILE if source.is_dir() else source
     write_extended(found, specimen, toml, run / EXTENDED)
     content = describe(found, seed)
-    diagnosis_page(found, content, specimen).write(run / "report.html")
+    diagnosis_page(found, content, specimen).under(provenance(specimen)).write(run / "report.html")
     write_json(content, run / "diagnosis.json")
     kept.finish()
     return found

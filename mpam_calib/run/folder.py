@@ -20,12 +20,16 @@ from mpam_calib.prediction.recorded import RECORDED, Recorded
 from mpam_calib.run.asked import LEFT_OUT, kept_left_out
 from mpam_calib.run.files import CHECKPOINT, write_csv, write_json
 from mpam_calib.run.kept import written_over
+from mpam_calib.run.provenance import provenance
+from mpam_calib.specimen.recording import Specimen
 
 REPORT = "report.html"
 WRITTEN = (RUN_FILE, POSTERIOR, "summary.csv", "bands.csv", REPORT)
 """What a finished calibration leaves."""
 DERIVED = ("predictions.csv", "designs.csv", "designs.html")
 """What later commands add, and what goes when the posterior they came from goes."""
+PROVENANCE = "provenance"
+"""Where ``run.json`` says of data that they are no measurements; older versions did not."""
 PACKAGE = Path(__file__).parents[1]
 PACKAGES = ("mpam-calib", "arviz", "emcee", "numpy", "scipy", "pandas")
 
@@ -35,10 +39,14 @@ def versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in PACKAGES}
 
 
-def run_digest(specimen_digest: str, **options: Any) -> str:
-    """SHA-256 over data, model, options, versions and code: what decides whether a RUN can be kept."""
-    content = json.dumps([specimen_digest, options, versions(), _code()], sort_keys=True, default=str)
-    return hashlib.sha256(content.encode()).hexdigest()
+def run_digest(specimen: Specimen, **options: Any) -> str:
+    """SHA-256 over data, model, options, versions and code: what decides whether a RUN can be kept.
+
+    Over what is said of where the data come from, too: it may stand in a comment, which no digest of a
+    specimen holds.
+    """
+    content = [specimen.digest, provenance(specimen), options, versions(), _code()]
+    return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def _code() -> str:
@@ -117,6 +125,7 @@ def describe(calibration: Calibration, digest: str) -> dict[str, Any]:
         "seed": calibration.seed,
         "versions": versions(),
         "specimen": {"name": specimen.name, "bladder_material": specimen.bladder_material},
+        PROVENANCE: provenance(specimen),
         "blueprint": calibration.model.blueprint.model_dump(mode="json"),
         RECORDED: Recorded.of(specimen).as_json(),
         "sampling": {

@@ -12,6 +12,7 @@ from mpam_calib.design.robust import Optimiser, designs_table
 from mpam_calib.errors import InputError
 from mpam_calib.posterior.stored import load_run
 from mpam_calib.run.files import demand_writable, write_csv
+from mpam_calib.run.folder import PROVENANCE
 from mpam_calib.thesis.chapter3 import MONOFILAMENTS
 from mpam_calib.thesis.tables import table
 from mpam_calib.units import KPA
@@ -55,7 +56,7 @@ def optimize_to_folder(run: Path, seed: int = 0) -> tuple[Path, Path]:
         draws=(len(optimiser.few), len(optimiser.many)),
         tested=predict(model, stored.draws, stored.seed, [P / KPA for P in pressures]),
     )
-    page = designs_page(view)
+    page = designs_page(view).under(str(stored.state.get(PROVENANCE, "")))
     write_csv(frame, run / TABLE)
     page.write(run / REPORT)
     return run / TABLE, run / REPORT

@@ -5,10 +5,9 @@ A word in a specimen's name is the user's own: "synthetic latex" is a rubber.
 
 from __future__ import annotations
 
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
 from mpam_calib.specimen.recording import Specimen
-from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 
 # Synthetic first: made from a reconstructed specimen's declaration, a recording bears both marks.
 PROVENANCE = {
@@ -20,7 +19,7 @@ PROVENANCE = {
 
 def provenance(specimen: Specimen) -> str:
     """A sentence on data that are no measurements, "" for all others."""
-    header = _header(specimen)
+    header = _header(specimen.declared_in)
     stems = [PurePath(file.name).stem for file in specimen.files]
     for word, sentence in PROVENANCE.items():
         named = f"({word})" in specimen.name or any(stem.endswith(f"_{word}") for stem in stems)
@@ -29,11 +28,13 @@ def provenance(specimen: Specimen) -> str:
     return ""
 
 
-def _header(specimen: Specimen) -> str:
-    """The comment that specimen.toml begins with; "" without one."""
+def _header(declaration: Path | None) -> str:
+    """The comment that a declaration begins with; "" without one."""
+    if declaration is None:
+        return ""
     try:
-        text = (specimen.folder / SPECIMEN_FILE).read_text(encoding="utf-8-sig")
-    except OSError:  # made in memory
+        text = declaration.read_text(encoding="utf-8-sig")
+    except OSError:  # gone since it was read
         return ""
     first = text.lstrip().partition("\n")[0]
     return first.removeprefix("#").strip() if first.startswith("#") else ""

@@ -13,6 +13,7 @@ from mpam_calib.report.selection import selection_page
 from mpam_calib.run.files import KEPT_FILE, demand_forces, demand_own, demand_writable, write_csv
 from mpam_calib.run.folder import run_digest
 from mpam_calib.run.kept import Kept
+from mpam_calib.run.provenance import provenance
 from mpam_calib.run.replaced import tell_replaced
 from mpam_calib.specimen import read
 
@@ -35,9 +36,7 @@ def select_to_folder(
     demand_own(run, RUN_FILE, KEPT_FILE)
     demand_other(specimen, run)
     material = material_of(specimen)
-    digest = run_digest(
-        specimen.digest, command="select", seed=seed, replicates=replicates, material=material
-    )
+    digest = run_digest(specimen, command="select", seed=seed, replicates=replicates, material=material)
     kept = Kept(run, "select", digest, FILES)
     if kept.finished():
         return None
@@ -52,6 +51,7 @@ def select_to_folder(
     kept.begin()
     write_csv(found.models, run / "models.csv")
     write_csv(found.sensitivity, run / "prior_sensitivity.csv")
-    selection_page(found, specimen, material).write(run / "report.html")
+    page = selection_page(found, specimen, material)
+    page.under(provenance(specimen)).write(run / "report.html")
     kept.finish()
     return found

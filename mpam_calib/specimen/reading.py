@@ -107,6 +107,7 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
             for file, count in zip(of(kind), counts, strict=True)
         ),
         noise=declaration.noise,
+        declared_in=source.file,
     )
 
 

@@ -137,7 +137,8 @@ class Specimen:
 
     ``levels_Pa`` are the pressure levels (sorted, the median reading of each) that every
     ``level`` index of the recordings refers to; ``digest`` is a SHA-256 over the declaration
-    and the bytes of every data file.
+    and the bytes of every data file; ``declared_in`` is the file of the declaration, None of a specimen that
+    was made in memory.
     """
 
     name: str
@@ -159,6 +160,7 @@ class Specimen:
     notes: tuple[str, ...] = ()
     files: tuple[FileRead, ...] = ()
     noise: Noise = field(default_factory=Noise)
+    declared_in: Path | None = None
 
     @property
     def has_muscle_data(self) -> bool:
