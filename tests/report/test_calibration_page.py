@@ -12,7 +12,7 @@ import pytest
 
 from mpam_calib.prediction.left_out import COLUMNS
 from mpam_calib.report.calibration import _left_out_section, _pairs_section, calibration_page
-from mpam_calib.report.figures import corner, density, residuals
+from mpam_calib.report.figures import corner, density, loops, residuals, style
 from mpam_calib.report.numbers import with_band
 from mpam_calib.report.page import DataTable, Text
 from mpam_calib.report.parameters import learnt_table, summary_table
@@ -301,3 +301,26 @@ def test_parameters_that_go_against_each_other_are_linked_as_strongly() -> None:
     )
     text = next(block for block in _pairs_section(made).blocks if isinstance(block, Text))
     assert "K_f and tip_factor (−1.00)" in text.html
+
+
+@pytest.mark.parametrize(
+    ("branches", "labels"),
+    [
+        (("loading", "unloading", ""), ["loading", "unloading", "others, friction-free"]),
+        (("loading", "unloading"), ["loading", "unloading"]),
+        (("",), []),
+    ],
+)
+def test_every_reading_has_its_place_beside_the_curves(
+    view: CalibrationView, branches: tuple[str, ...], labels: list[str]
+) -> None:
+    """Also one without a branch where others have one."""
+    seen = view.observed[view.observed["kind"] == "loops"]
+    ways = np.array(branches)[np.arange(len(seen)) % len(branches)]
+    for panel in loops.draw(replace(view, observed=seen.assign(branch=ways))).axes:
+        if not panel.get_title(loc="left"):
+            continue
+        dots = [line.get_color() for line in panel.lines if line.get_marker() == "o"]
+        assert dots == [style.BRANCH_COLOURS[branch or "mean"] for branch in branches]
+        written = [text.get_text() for text in panel.texts]
+        assert written == (labels if panel.get_title(loc="left") == "50 kPa" else [])

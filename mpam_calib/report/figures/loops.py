@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 MAX_PANELS = 9
 POINTS_IN_PANEL = 56
+LABELS = {"loading": "loading", "unloading": "unloading", "mean": "others, friction-free"}
+"""Of readings without a branch the simulation, too, has no friction."""
 
 
 def draw(view: CalibrationView) -> Figure:
@@ -29,16 +31,17 @@ def draw(view: CalibrationView) -> Figure:
         figure = style.new_figure(2.55 * rows + 0.2)
         grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
         panels = list(grid.flat)
+        drawn: set[str] = set()
         for ax, level in zip(panels, levels, strict=False):
-            _panel(ax, view, level, readings[readings["level_kPa"] == level], POINTS_IN_PANEL)
+            drawn |= _panel(ax, view, level, readings[readings["level_kPa"] == level], POINTS_IN_PANEL)
         for ax in panels[len(levels) :]:
             style.blank(ax)
         for i, ax in enumerate(panels[: len(levels)]):
             if i + columns >= len(levels):
                 ax.set_xlabel("contraction (% of the length at rest)")
                 ax.tick_params(labelbottom=True)
-        moving = [b for b in ("loading", "unloading") if b in set(readings["branch"])]
-        _label_branches(panels[0], moving)
+        if drawn - {"mean"}:
+            _label_branches(panels[0], [branch for branch in LABELS if branch in drawn])
         for row in grid:
             row[0].set_ylabel("force (N)")
     return figure
@@ -49,7 +52,8 @@ def shown_levels(view: CalibrationView) -> list[float]:
     return style.spread(sorted(float(x) for x in view.levels_kPa), MAX_PANELS)
 
 
-def _panel(ax: Axes, view: CalibrationView, level: float, readings: pd.DataFrame, points: int) -> None:
+def _panel(ax: Axes, view: CalibrationView, level: float, readings: pd.DataFrame, points: int) -> set[str]:
+    """Returns the branches that were drawn."""
     bands = _nearest(view.quantity("force_N"), level)
     noisy = _nearest(view.quantity("force_N_observed"), level)
     branches = _branches(bands, readings)
@@ -64,7 +68,8 @@ def _panel(ax: Axes, view: CalibrationView, level: float, readings: pd.DataFrame
                 ax.plot(
                     100.0 * outer["contraction"], outer[q], color=colour, linewidth=0.6, linestyle=(0, (2, 2))
                 )
-        mine = readings if branches == ["mean"] else readings[readings["branch"] == branch]
+        rest = ~readings["branch"].isin([b for b in branches if b != "mean"])
+        mine = readings[rest if branch == "mean" else readings["branch"] == branch]
         kept = style.thinned(mine.sort_values("contraction", kind="stable"), points // len(branches))
         ax.plot(
             100.0 * kept["contraction"], kept["force_N"], "o", color=colour, markerfacecolor="white",
@@ -72,6 +77,7 @@ def _panel(ax: Axes, view: CalibrationView, level: float, readings: pd.DataFrame
         )  # fmt: skip
     ax.set_title(f"{level:g} kPa")
     ax.axhline(0.0, color=style.GREY, linewidth=0.7)
+    return set(branches)
 
 
 def _nearest(bands: pd.DataFrame, level: float) -> pd.DataFrame:
@@ -84,16 +90,16 @@ def _nearest(bands: pd.DataFrame, level: float) -> pd.DataFrame:
 
 
 def _branches(bands: pd.DataFrame, readings: pd.DataFrame) -> list[str]:
-    """The branches to draw: those with readings, or the friction-free curve."""
+    """The branches to draw: those with readings, and the friction-free curve for all that have none."""
     seen, known = set(readings["branch"]), set(bands["branch"])
     moving = [branch for branch in ("loading", "unloading") if branch in seen and branch in known]
-    return moving or ["mean"]
+    return [*moving, "mean"] if not moving or seen - set(moving) else moving
 
 
 def _label_branches(ax: Axes, branches: list[str]) -> None:
     """Branch names in their colours; force falls with contraction, so that corner is always free."""
     for i, branch in enumerate(branches):
         ax.text(
-            0.98, 0.97 - 0.10 * i, branch, transform=ax.transAxes, ha="right", va="top",
+            0.98, 0.97 - 0.10 * i, LABELS[branch], transform=ax.transAxes, ha="right", va="top",
             color=style.BRANCH_COLOURS[branch], fontweight="bold", fontsize=8.5,
         )  # fmt: skip
