@@ -257,7 +257,9 @@ def assess(view: CalibrationView) -> Verdict:
     reasons = [limit.sentence for limit in limits]
     if asked := look_first(view, level):
         reasons.insert(1, asked)
-    if in_order:
+    stopped = convergence(view)
+    unsettled = stopped is not None and stopped.level == "bad"
+    if in_order and not unsettled:  # by draws that do not stand for the posterior nothing is in order
         reasons.append(f"What is fine: {'; '.join(in_order)}.")
     return Verdict(_sentence(level, limits), level, reasons)
 

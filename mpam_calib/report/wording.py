@@ -90,13 +90,10 @@ def left_aside(specimen: Specimen, what: str) -> list[str]:
 def convergence_sentences(c: Convergence) -> str:
     """Whether the calculation settled, for a reader who has never run one; paragraphs."""
     ess = c.ess_min
-    settled = (
-        "Yes."
-        if c.converged and c.rhat_max <= RHAT_LIMIT and ess >= c.ess_wanted
-        else "No: treat every number on this page as provisional."
-    )
+    settled = c.converged and c.rhat_max <= RHAT_LIMIT and ess >= c.ess_wanted
+    answer = "Yes." if settled else "No: treat every number on this page as provisional."
     start = (
-        f"{settled} The answer is a cloud of {c.draws:,} plausible parameter sets. {c.ensembles} groups of "
+        f"{answer} The answer is a cloud of {c.draws:,} plausible parameter sets. {c.ensembles} groups of "
         f"{c.walkers} walkers began far apart and walked {c.steps:,} steps without knowing of each "
         "other. If they end in the same place, the answer does not depend on where they began."
     )
@@ -112,9 +109,11 @@ def convergence_sentences(c: Convergence) -> str:
         )
     if math.isfinite(c.acceptance):
         agreement += f" {100 * c.acceptance:.0f} % of the proposed steps were taken."
-    modes = (
-        "All of them found the same explanation of the data."
-        if c.modes <= 1
-        else f"They found {c.modes} separate explanations; more data, not more steps, must choose."
-    )
-    return f"{start}\n\n{agreement}\n\n{modes}"
+    paragraphs = [start, agreement]
+    if c.modes > 1:
+        paragraphs.append(
+            f"They found {c.modes} separate explanations; more data, not more steps, must choose."
+        )
+    elif settled:
+        paragraphs.append("All of them found the same explanation of the data.")
+    return "\n\n".join(paragraphs)

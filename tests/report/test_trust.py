@@ -150,6 +150,17 @@ def test_whatever_is_doubted_in_the_data_stands_behind_the_worst_reason(sound: C
         assert trust.assess(doubtful).reasons[1] == f"Look at the data first: {odd}"
 
 
+def test_nothing_is_fine_and_nothing_was_found_before_the_calculation_has_settled(
+    sound: CalibrationView,
+) -> None:
+    same = "All of them found the same explanation"
+    for view, told in ((sound, True), (settled(sound, converged=False), False)):
+        assert any("What is fine" in reason for reason in trust.assess(view).reasons) == told
+        assert (same in convergence_sentences(view.convergence)) == told
+    apart = settled(sound, converged=False, modes=2)
+    assert "They found 2 separate explanations" in convergence_sentences(apart.convergence)
+
+
 def test_an_unassessed_remainder_is_no_good_news(sound: CalibrationView) -> None:
     verdict = trust.assess(replace(sound, remainder=float("nan")))
     assert not any("noise" in reason for reason in verdict.reasons)
