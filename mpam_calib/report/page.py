@@ -8,9 +8,7 @@ True
 
 from __future__ import annotations
 
-import os
 import re
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -18,6 +16,7 @@ from pathlib import Path
 
 import jinja2
 
+from mpam_calib.posterior.chains.checkpoint import write_atomically
 from mpam_calib.report.blocks import (
     Block,
     DataTable,
@@ -98,19 +97,6 @@ class Page:
 
     def write(self, path: str | Path) -> Path:
         """Write the page to ``path`` in one move: readers see the old file or the new one."""
-        path = Path(path)
         text = self.render()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".report-", suffix=".html")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-            # mkstemp makes files private; a report is as readable as any other new file
-            umask = os.umask(0)
-            os.umask(umask)
-            os.chmod(name, 0o666 & ~umask)
-            os.replace(name, path)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
-        return path
+        write_atomically(Path(path), lambda p: p.write_text(text, encoding="utf-8", newline="\n"))
+        return Path(path)

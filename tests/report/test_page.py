@@ -6,12 +6,14 @@ import re
 import subprocess
 import sys
 from html.parser import HTMLParser
+from pathlib import Path
 
 import pandas as pd
 import pytest
 from markupsafe import Markup
 from matplotlib.figure import Figure as MplFigure
 
+from mpam_calib.posterior.chains.checkpoint import sweep
 from mpam_calib.report.page import (
     DataTable,
     Figure,
@@ -126,6 +128,15 @@ def test_writing_replaces_the_file_and_leaves_nothing_else(tmp_path) -> None:
     page("second").write(target)
     assert "second" in target.read_text(encoding="utf-8")
     assert [path.name for path in target.parent.iterdir()] == ["report.html"]
+
+
+def test_what_a_killed_write_leaves_is_swept(tmp_path, monkeypatch) -> None:
+    written = []
+    monkeypatch.setattr("os.replace", lambda source, target: written.append(Path(source)))
+    page("first").write(tmp_path / "report.html")
+    written[0].write_text("<html")
+    sweep(tmp_path)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_failed_write_keeps_the_old_file(tmp_path, monkeypatch) -> None:
