@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import pickle
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -179,8 +182,30 @@ def test_a_write_that_fails_leaves_what_was_there(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["table.csv"]
 
 
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere nobody can remove an open file")
+def test_what_another_process_is_writing_is_not_swept(tmp_path: Path) -> None:
+    table = tmp_path / "table.csv"
+    code = (
+        "import sys; from pathlib import Path;"
+        "from mpam_calib.posterior.chains.checkpoint import write_atomically;"
+        "write_atomically(Path(sys.argv[1]), lambda p: (print('begun', flush=True), sys.stdin.read(),"
+        "p.write_text('whole')))"
+    )
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", code, str(table)], stdin=pipe, stdout=pipe) as writer:
+        assert writer.stdout is not None and writer.stdout.readline() == b"begun\n"
+        sweep(tmp_path)
+        writer.communicate()
+    assert writer.returncode == 0
+    assert table.read_text() == "whole"
+    (tmp_path / f".table.csv.{writer.pid}.abc.part").write_text("ne")
+    sweep(tmp_path)
+    assert list(tmp_path.iterdir()) == [table]
+
+
 def test_what_a_killed_process_left_is_swept(tmp_path: Path) -> None:
     (tmp_path / ".table.csv.abc.part").write_text("ne")
+    (tmp_path / f".table.csv.{os.getpid()}.abc.part").write_text("ne")
     (tmp_path / ".keep").write_text("mine")
     sweep(tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == [".keep"]

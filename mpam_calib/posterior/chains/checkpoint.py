@@ -45,7 +45,8 @@ class Damaged(ValueError):
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     """Let ``write`` fill a temporary file beside ``path``, then put it in place in one step."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=UNFINISHED)
+    prefix = f".{path.name}.{os.getpid()}."
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=UNFINISHED)
     os.close(handle)
     temporary = Path(name)
     try:
@@ -60,7 +61,22 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
 def sweep(folder: Path) -> None:
     """Remove the unfinished files that a killed process left in a folder."""
     for path in folder.glob(f".*{UNFINISHED}"):
-        path.unlink(missing_ok=True)
+        if not _being_written(path):
+            path.unlink(missing_ok=True)
+
+
+def _being_written(path: Path) -> bool:
+    """Whether another process, whose number is in the file's name, is still there to write it."""
+    number = path.name.split(".")[-3]
+    if os.name != "posix" or not number.isdigit() or int(number) == os.getpid():
+        return False
+    try:
+        os.kill(int(number), 0)  # sends nothing: asks only
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:  # another user's
+        return True
+    return True
 
 
 @dataclass(frozen=True)
