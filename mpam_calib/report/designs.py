@@ -39,6 +39,8 @@ Array = NDArray[np.float64]
 
 SHOWN_AT = 200.0 * KPA
 """The pressure of the first screen, Pa: that of the thesis's own optimum."""
+NEGLIGIBLE = 0.01
+"""Share of the blocked force below which the braid's term is."""
 LAWS = {
     "constant": "they are taken not to depend on pressure at all",
     "linear": "their straight lines are drawn on",
@@ -129,12 +131,11 @@ def _extrapolation(view: DesignsView) -> Notice:
             (("R", MM, " mm", 2), ("t", MM, " mm", 3), ("α", DEG, "°", 1))
         )
     ]
-    low, high = view.levels[0] / KPA, view.levels[-1] / KPA
+    tested, designed = (_pressures(p, to) for p, to in ((view.levels, " to "), (view.pressures, "–")))
     return Notice(
         f"Extrapolated. Everything that was fitted, the moduli above all, was fitted to one muscle with "
-        f"R = {geometry.R0_mm:g} mm, t = {geometry.t0_mm:g} mm, α = {geometry.alpha0_deg:g}° at {low:.0f} to "
-        f"{high:.0f} kPa. Here it is carried to {', '.join(spans)} and to "
-        f"{view.pressures[0] / KPA:.0f}–{view.pressures[-1] / KPA:.0f} kPa, as if moduli belonged to the "
+        f"R = {geometry.R0_mm:g} mm, t = {geometry.t0_mm:g} mm, α = {geometry.alpha0_deg:g}° at {tested}. "
+        f"Here it is carried to {', '.join(spans)} and to {designed}, as if moduli belonged to the "
         "material alone. Moduli fitted at one R and t need not hold at another, and no band on this page "
         "contains that error: build and test a design before relying on it."
     )
@@ -143,6 +144,12 @@ def _extrapolation(view: DesignsView) -> Notice:
 def _span(values: Array, digits: int) -> str:
     low, high = fixed(float(values.min()), digits), fixed(float(values.max()), digits)
     return low if low == high else f"{low}–{high}"
+
+
+def _pressures(ordered: Sequence[float] | Array, to: str) -> str:
+    """The first and the last of some pressures (Pa); one alone stands by itself."""
+    ends = dict.fromkeys(f"{P / KPA:.4g}" for P in (ordered[0], ordered[-1]))
+    return f"{to.join(ends)} kPa"
 
 
 def _shown(view: DesignsView) -> float:
@@ -287,10 +294,9 @@ def _packing(view: DesignsView) -> Section:
                 f"Case I within the thesis's bounds ends at {one.x[4]:.0f} strands of R_br = "
                 f"{fixed(one.x[3] / MM, 2)} mm at {item.P / KPA:.0f} kPa; of such strands {fit:.0f} in each "
                 f"direction fit round the muscle. They cost {significant(whole - item.free, 2)} N against "
-                "Case II, and that the braid's term is negligible follows from them alone. With strands that "
-                f"must fit, it takes {taken}: the first within Table 3.1's bound, the last no thicker than a "
-                "real monofilament. The designs in designs.csv are those without this constraint, as in the "
-                "thesis."
+                f"Case II{_of_strands(whole, item)}. With strands that must fit, it takes {taken}: the first "
+                "within Table 3.1's bound, the last no thicker than a real monofilament. The designs in "
+                "designs.csv are those without this constraint, as in the thesis."
             ),
             DataTable(
                 pd.DataFrame(rows, columns=columns),
@@ -299,6 +305,14 @@ def _packing(view: DesignsView) -> Section:
             ),
         ],
     )
+
+
+def _of_strands(whole: float, item: Packed) -> str:
+    """Where the braid's term is negligible beside the ``whole`` force (N) only if strands need not fit."""
+    free, fitting = whole - item.free, whole - min(item.force)
+    if free < NEGLIGIBLE * whole <= fitting:
+        return ", and that the braid's term is negligible follows from them alone"
+    return ""
 
 
 def _bands(view: DesignsView) -> Section:

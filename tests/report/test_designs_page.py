@@ -11,7 +11,7 @@ from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.report.design_bounds import beyond_bounds
 from mpam_calib.report.designs import DesignsView, designs_page
 from mpam_calib.report.designs_table import contraction_band
-from mpam_calib.report.page import DataTable, Headline, Notice, Numbers, Page
+from mpam_calib.report.page import DataTable, Headline, Notice, Numbers, Page, Text
 from mpam_calib.specimen.declaration import Geometry, Sensors, Simulation
 
 THESIS = Geometry(L0_mm=50.0, R0_mm=3.0, t0_mm=0.7, alpha0_deg=72.0)
@@ -35,8 +35,17 @@ def design(case: str, method: str, wall: float) -> Design:
     return Design(case, P, method, x, draws, draws, 0.3 + 0.0 * draws, HELD)
 
 
-def page(geometry: Geometry, tested: pd.DataFrame = TESTED, cautious: float = 0.676e-3) -> Page:
-    """A page of one pressure; the two aims part where the ``cautious`` wall is another."""
+def page(
+    geometry: Geometry,
+    tested: pd.DataFrame = TESTED,
+    cautious: float = 0.676e-3,
+    levels: tuple[float, ...] = (1e5, 3e5),
+    packed: tuple[float, float] = (73.0, 72.9),
+) -> Page:
+    """A page of one pressure; the two aims part where the ``cautious`` wall is another.
+
+    ``packed``: the force (N) with any strands, and with those that fit; it is 73.07 N without any.
+    """
     designs = [
         design(case, method, wall)
         for case in ("I", "II")
@@ -48,12 +57,13 @@ def page(geometry: Geometry, tested: pd.DataFrame = TESTED, cautious: float = 0.
         braid=None,
         sensors=Sensors(),
         simulation=Simulation(),
-        levels=(1e5, 3e5),
-        reach=(0.3, 0.3),
+        levels=levels,
+        reach=(0.3,) * len(levels),
     )
     view = DesignsView(
-        "A", True, blueprint, designs, designs_table(designs), [Packed(P, 73.0, (designs[0].x,), (72.9,))],
-        (2.5e-3,), {"I": np.array([79.58]), "II": np.array([79.59])}, (50, 50), tested,
+        "A", True, blueprint, designs, designs_table(designs),
+        [Packed(P, packed[0], (designs[0].x,), packed[1:])], (2.5e-3,),
+        {"I": np.array([79.58]), "II": np.array([79.59])}, (50, 50), tested,
     )  # fmt: skip
     return designs_page(view)
 
@@ -74,6 +84,28 @@ def tables(page: Page) -> list[DataTable]:
 def test_the_headline_says_within_which_bounds() -> None:
     (headline,) = (b for b in page(LARGE).lead if isinstance(b, Headline))
     assert "Within the thesis's bounds (R 0.45–3 mm, t 0.16–1.5 mm, α 36–72°" in headline.html
+
+
+@pytest.mark.parametrize(
+    ("levels", "said"),
+    [((1e5, 3e5), "° at 100 to 300 kPa."), ((2e5,), "° at 200 kPa."), ((2.5e3, 3e5), "° at 2.5 to 300 kPa.")],
+)
+def test_recorded_pressures_are_told_from_to_and_one_by_itself(levels: tuple[float, ...], said: str) -> None:
+    (words,) = (t for t in told(page(THESIS, levels=levels)) if t.startswith("Extrapolated."))
+    assert said in words and "and to 200 kPa, as if" in words
+
+
+@pytest.mark.parametrize(
+    ("packed", "told"),
+    [((73.0, 71.9), True), ((73.06, 73.05), False), ((60.0, 50.0), False)],
+)
+def test_strands_are_said_to_hide_the_braid_s_term_only_where_they_do(
+    packed: tuple[float, float], told: bool
+) -> None:
+    """Not where stiff ones that fit cost nothing either, nor where it is large with any."""
+    (text,) = (b.html for b in page(THESIS, packed=packed).sections[1].blocks if isinstance(b, Text))
+    assert ("negligible follows from them alone" in text) == told
+    assert "N against Case II" in text
 
 
 def test_a_tested_muscle_outside_the_bounds_is_told_with_its_own_force() -> None:
