@@ -106,3 +106,5 @@ def test_residuals_are_drawn_of_what_their_titles_say(
     place, same = np.linspace(0.0, 0.3, 20), np.ones(20)
     figure = residual_maps(place, same, np.repeat([5.0, 9.0], 10), dict.fromkeys(compared, same), 1.0)
     assert [ax.get_title(loc="left") for ax in figure.axes] == list(compared)
+    (last,) = ([text.get_text() for text in ax.texts] for ax in figure.axes if ax.texts)
+    assert last == ["9 kPa", "5 kPa"]  # which colour is which level

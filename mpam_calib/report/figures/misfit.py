@@ -55,4 +55,5 @@ def residual_maps(
             ax.set_title(title)
             ax.set_xlabel("contraction (%)")
         axes[0].set_ylabel("reading − model (N)")
+        style.label_levels(axes[-1], colours)
     return figure

@@ -37,7 +37,7 @@ def draw(view: CalibrationView) -> Figure:
             ax.set_title(style.BRANCH_WORDS.get(branch, "all readings"))
             ax.set_xlabel("contraction (% of the length at rest)")
         axes[0].set_ylabel("reading − simulation (N)")
-        _label_levels(axes[-1], levels, colours)
+        style.label_levels(axes[-1], colours)
     return figure
 
 
@@ -94,15 +94,3 @@ def binned(x: Floats, y: Floats, bins: int = BINS) -> tuple[Floats, Floats]:
     sums = (np.bincount(place, weights=v, minlength=bins)[filled] for v in (x, y))
     mean_x, mean_y = (s / count[filled] for s in sums)
     return mean_x, mean_y
-
-
-def _label_levels(
-    ax: Axes, levels: list[float], colours: dict[float, tuple[float, float, float, float]]
-) -> None:
-    """Levels as coloured words in the margin, highest on top."""
-    shown = style.spread(levels, 12)
-    for i, level in enumerate(reversed(shown)):
-        ax.text(
-            1.03, 0.95 - 0.075 * i, f"{level:g} kPa", color=colours[level], transform=ax.transAxes,
-            va="top", fontweight="bold", fontsize=8,
-        )  # fmt: skip

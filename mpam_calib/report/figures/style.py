@@ -83,6 +83,15 @@ def level_colours(levels: Sequence[float]) -> dict[float, tuple[float, float, fl
     return {level: mpl.colormaps["viridis"](shade) for level, shade in zip(levels, shades, strict=False)}
 
 
+def label_levels(ax: Axes, colours: Mapping[float, tuple[float, float, float, float]]) -> None:
+    """Levels (kPa, rising) as words of their colours in the margin, highest on top."""
+    for i, level in enumerate(reversed(spread(list(colours), 12))):
+        ax.text(
+            1.03, 0.95 - 0.075 * i, f"{level:g} kPa", color=colours[level], transform=ax.transAxes,
+            va="top", fontweight="bold", fontsize=8,
+        )  # fmt: skip
+
+
 def spread(items: Sequence[float], at_most: int) -> list[float]:
     """At most so many of the items, evenly spread and with both ends.
 
