@@ -13,6 +13,7 @@ from typing import Final
 from mpam_calib.posterior.chains.convergence import RHAT_LIMIT
 from mpam_calib.report.blocks import Level, Verdict
 from mpam_calib.report.doubts import look_first, overruled_slack, wandering
+from mpam_calib.report.free_read import free_read
 from mpam_calib.report.gauge import gauge
 from mpam_calib.report.held import (
     Held,
@@ -166,7 +167,12 @@ def _all_narrowed(view: CalibrationView) -> bool:
 
 
 def _noise_ordinary(view: CalibrationView) -> bool:
-    return noise_size(view) is None and lasting_noise(view) is None
+    return _plain_noise(view) and lasting_noise(view) is None
+
+
+def _plain_noise(view: CalibrationView) -> bool:
+    """Whether no noise, of the load cell or of a free contraction, holds what the simulation misses."""
+    return noise_size(view) is None and free_read(view) is None
 
 
 def _enough(held: Held | None) -> bool:
@@ -188,7 +194,7 @@ CHECKS: tuple[Check, ...] = (
     Check(
         along_stroke,
         "the readings lie in their bands",
-        lambda view: _enough(held_along(view)) and noise_size(view) is None,
+        lambda view: _enough(held_along(view)) and _plain_noise(view),
     ),
     Check(
         between_levels,
@@ -208,6 +214,7 @@ CHECKS: tuple[Check, ...] = (
         "the simulation fits to within the noise or half a per cent",
         lambda view: math.isfinite(view.remainder) and math.isfinite(view.noise) and _noise_ordinary(view),
     ),
+    Check(free_read),
     Check(overruled_slack),
     Check(
         full_length,

@@ -72,9 +72,9 @@ class CalibrationView:
     reduced reading (``OBSERVED_COLUMNS``): kind is loops, force_map, blocked_force, free_contraction
     or tensile; ``fitted_N`` is the posterior mean of the declared simulation *without* the remainder,
     ``low_N`` and ``high_N`` the 90 % band of another such reading (of as many rows), with it, at that
-    reading's own pressure and place. A free contraction has its reading in ``contraction``, and in
-    ``fitted_N`` a contraction too; a tensile reading has the strain in ``contraction`` and stresses in Pa in
-    the columns of force.
+    reading's own pressure and place. A free contraction has its reading in ``contraction``, and in these
+    columns contractions too, of which the band is that of the curve without a reading's noise; a tensile
+    reading has the strain in ``contraction`` and stresses in Pa in the columns of force.
 
     ``draws`` and ``prior_draws``: parameter name to draws, shape (draws,), for the names in
     ``headline`` (at most eight are shown), ``meanings`` what each parameter is, in a few words.

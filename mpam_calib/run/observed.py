@@ -18,7 +18,7 @@ from mpam_calib.posterior.draws import Draws
 from mpam_calib.posterior.likelihood.bins import LoopBins
 from mpam_calib.posterior.likelihood.covariance import lasting_share
 from mpam_calib.posterior.likelihood.points import KINDS, Points
-from mpam_calib.prediction.curves import BATCH_CELLS
+from mpam_calib.prediction.curves import BATCH_CELLS, contraction_grid, first_root, force_curves
 from mpam_calib.prediction.fitted import fitted_force, fitted_stress, noise_of
 from mpam_calib.prediction.reading_noise import ReadingNoise
 from mpam_calib.report.view import OBSERVED_COLUMNS
@@ -98,10 +98,12 @@ def _points_frames(
         frame = _frame(KINDS[number], some.readings, some.force, some.censored, calibration)
         if KINDS[number] != "free_contraction":
             frame = frame.assign(fitted_N=fitted[rows], low_N=low[rows], high_N=high[rows])
-        elif guide.slope is not None:
-            # Newtons to contraction along the curve's slope there.
-            slope = guide.slope[rows] * model.setting.geometry.L0
-            frame["fitted_N"] = frame["contraction"] - fitted[rows] / slope
+        else:
+            frame["low_N"], frame["high_N"] = _free_bands(some.readings.pressure, calibration)
+            if guide.slope is not None:
+                # Newtons to contraction along the curve's slope there.
+                slope = guide.slope[rows] * model.setting.geometry.L0
+                frame["fitted_N"] = frame["contraction"] - fitted[rows] / slope
         found.append((frame, left[rows & ~points.censored]))
     return found
 
@@ -129,6 +131,22 @@ def _bands(
             noise = _noise_of_means(noise, bins, part)
         ends.append(np.quantile(force + noise.draw(force, rng), [0.05, 0.95], axis=0))
     low, high = np.concatenate(ends, axis=1)
+    return low, high
+
+
+def _free_bands(pressures: Array, calibration: Calibration) -> tuple[Array, Array]:
+    """Ends (n,) of the 90 % band of the curve's own free contraction at pressures (n,), Pa.
+
+    Without the noise of a reading, which takes up whatever the readings and the curve differ by.
+    """
+    model, draws = calibration.model, calibration.draws.thin(BAND_DRAWS)
+    grid = contraction_grid(model, max(model.blueprint.reach))
+    different, which = np.unique(pressures, return_inverse=True)
+    ends = np.empty((2, len(different)))
+    for i in range(len(different)):
+        curves = force_curves(model, draws, different[i : i + 1], grid, calibration.seed)
+        ends[:, i] = np.quantile(first_root(grid, curves.force[:, 0, 2]), [0.05, 0.95])
+    low, high = ends[:, which]
     return low, high
 
 

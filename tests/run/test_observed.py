@@ -114,17 +114,17 @@ def test_a_static_reading_is_shown_with_the_level_it_is_nearest_to(calibration: 
 
 
 def test_a_free_contraction_is_shown_beside_that_of_the_fit() -> None:
-    """A map tells the curve; the free contractions were all read 0.01 too far."""
+    """A map tells the curve; the free contractions were all read 0.01 too far, one between the levels."""
     pressure, grid = np.repeat([1e5, 1.5e5, 2e5], 30), np.tile(np.linspace(0.0, 0.26, 30), 3)
     force = static_force(pressure / KPA, grid) + NOISE_N * np.random.default_rng(4).standard_normal(90)
     still = np.zeros(90, dtype=np.int64)
     force_map = ForceMap(pressure, grid, force, np.repeat(np.arange(3), 30), still, still > 0)
-    true = np.array([free_contraction(level) for level in (100.0, 150.0, 200.0)])
+    true = np.array([free_contraction(level) for level in (100.0, 125.0, 200.0)])
     made = build.specimen(
         {"order": 2, "law": "linear", "friction": "none"},
         levels_kPa=(100.0, 150.0, 200.0),
         force_map=force_map,
-        free_contraction=FreeContraction(np.array([1e5, 1.5e5, 2e5]), true + 0.01),
+        free_contraction=FreeContraction(np.array([1e5, 1.25e5, 2e5]), true + 0.01),
         sensors=Sensors(force_sd_N=NOISE_N),
     )
     found = calibrate(made, max_steps=60, ess_wanted=150.0, options=build.PLAIN)
@@ -132,3 +132,7 @@ def test_a_free_contraction_is_shown_beside_that_of_the_fit() -> None:
     free = rows[rows["kind"] == "free_contraction"]
     np.testing.assert_allclose(free["contraction"], true + 0.01)
     np.testing.assert_allclose(free["fitted_N"], true, atol=0.004)
+    # The band is the curve's, at the reading's own pressure, and does not take the difference up as noise.
+    low, high = free["low_N"].to_numpy(), free["high_N"].to_numpy()
+    np.testing.assert_allclose((low + high) / 2.0, true, atol=0.002)
+    assert (high < true + 0.006).all()
