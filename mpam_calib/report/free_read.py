@@ -44,6 +44,18 @@ def free_read(view: CalibrationView) -> Limit | None:
     return _told(view, levels.iloc[int(levels["miss"].abs().to_numpy().argmax())])
 
 
+def early_roots(view: CalibrationView) -> Limit | None:
+    """Draws whose force is gone well short of a measured free contraction, too many to leave them out."""
+    if not view.early_roots > 0.0:
+        return None
+    words = "the simulation contradicts a measured free contraction"
+    sentence = (
+        f"In {100.0 * view.early_roots:.0f} % of the draws the force is gone well short of a measured free "
+        "contraction: this simulation and these data contradict each other."
+    )
+    return Limit("caution", sentence, words)
+
+
 def _told(view: CalibrationView, level: pd.Series) -> Limit:
     """The measured value and the curve's side by side, at the level where they differ most."""
     read, curve = (f"{significant(100.0 * level[name], 3)} %" for name in ("contraction", "curve"))

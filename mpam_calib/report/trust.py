@@ -13,7 +13,7 @@ from typing import Final
 from mpam_calib.posterior.chains.convergence import RHAT_LIMIT
 from mpam_calib.report.blocks import Level, Verdict
 from mpam_calib.report.doubts import look_first, overruled_slack, wandering
-from mpam_calib.report.free_read import free_read
+from mpam_calib.report.free_read import early_roots, free_read
 from mpam_calib.report.gauge import gauge
 from mpam_calib.report.held import (
     Held,
@@ -71,6 +71,17 @@ def convergence(view: CalibrationView) -> Limit | None:
         sentence = f"The data allow {c.modes} separate explanations; the bands mix them."
         return Limit("caution", sentence, f"there are {c.modes} separate explanations")
     return None
+
+
+def borrowed(view: CalibrationView) -> Limit | None:
+    """The moduli come from a run that has not settled itself."""
+    if not view.unsettled_moduli:
+        return None
+    words = "the run that the moduli come from did not converge"
+    sentence = (
+        f"T{words[1:]}: they and their bands may be wrong. Run it longer (--max-steps), then this again."
+    )
+    return Limit("bad", sentence, words)
 
 
 def remainder(view: CalibrationView) -> Limit | None:
@@ -191,6 +202,7 @@ class Check:
 # To lie within noise that holds what the simulation misses is no good news.
 CHECKS: tuple[Check, ...] = (
     Check(convergence, "the calculation has settled"),
+    Check(borrowed),
     Check(
         along_stroke,
         "the readings lie in their bands",
@@ -215,6 +227,7 @@ CHECKS: tuple[Check, ...] = (
         lambda view: math.isfinite(view.remainder) and math.isfinite(view.noise) and _noise_ordinary(view),
     ),
     Check(free_read),
+    Check(early_roots),
     Check(overruled_slack),
     Check(
         full_length,

@@ -83,7 +83,9 @@ class CalibrationView:
     nan where not assessed; ``reading_noise`` (N) is what readings scatter by from one to the next,
     ``declared_noise`` the declared ``force_sd_N``; ``strays_kPa`` how far the strokes of each level
     stray from its pressure, shape (levels,), empty without loops; ``curves_end`` the contraction up to which
-    the curves behind the bands were looked at. ``unidentified`` has ``parameter, prior_sd,
+    the curves behind the bands were looked at; ``unsettled_moduli`` whether the moduli come from a run that
+    did not converge, ``early_roots`` the share of draws whose force is gone well short of a measured free
+    contraction. ``unidentified`` has ``parameter, prior_sd,
     posterior_sd, contraction`` (1 − 90 % band of the posterior over that of the prior) ``, sentence``.
     ``left_out`` has a row for each level that was predicted from the others: ``pressure_kPa, readings,
     rmse_N, bias_N, bias_sd_N, inside90, extrapolated``.
@@ -119,6 +121,8 @@ class CalibrationView:
     strays_kPa: Sequence[float] = ()
     curves_end: float = float("nan")
     pressure_bias_sd_kPa: float = 0.0
+    unsettled_moduli: bool = False
+    early_roots: float = 0.0
 
     @property
     def tensile(self) -> bool:

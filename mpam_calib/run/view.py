@@ -26,7 +26,7 @@ from mpam_calib.run.folder import versions
 from mpam_calib.run.observed import in_kpa, observed_readings
 from mpam_calib.run.provenance import provenance
 from mpam_calib.specimen.oddities import oddities, stroke_stray
-from mpam_calib.specimen.recording import Loops
+from mpam_calib.specimen.recording import Loops, Specimen
 from mpam_calib.specimen.summary import reading_noise
 from mpam_calib.units import KPA
 
@@ -90,6 +90,8 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
         strays_kPa=() if specimen.loops is None else _strays_kPa(specimen.loops, specimen.levels_Pa),
         curves_end=_curves_end(model),
         pressure_bias_sd_kPa=specimen.sensors.pressure_bias_sd_kPa,
+        unsettled_moduli=_unsettled_moduli(specimen),
+        early_roots=_early_share(calibration),
     )
 
 
@@ -157,12 +159,6 @@ def _settings(calibration: Calibration) -> dict[str, str]:
 def _warnings(calibration: Calibration) -> list[str]:
     specimen, material = calibration.specimen, calibration.model.blueprint.material
     warnings = oddities(specimen)
-    early = early_roots(calibration.target, calibration.draws)
-    if early is not None and early.any():
-        warnings.append(
-            f"In {100.0 * early.mean():.0f} % of the draws the force is gone well short of a measured free "
-            "contraction: this simulation and these data contradict each other."
-        )
     if material is None:
         return warnings
     if material.strain_range is None:
@@ -176,9 +172,14 @@ def _warnings(calibration: Calibration) -> list[str]:
             f"The moduli come from a tensile test between strains {low:g} and {high:g}; "
             "a wall strained otherwise is extrapolated."
         )
-    if (folder := material_folder(specimen)) is not None and unconverged(folder):
-        warnings.append(
-            "The run that the moduli come from did not converge: they and their bands may be wrong. Run it "
-            "longer (--max-steps), then this again."
-        )
     return warnings
+
+
+def _early_share(calibration: Calibration) -> float:
+    early = early_roots(calibration.target, calibration.draws)
+    return 0.0 if early is None else float(early.mean())
+
+
+def _unsettled_moduli(specimen: Specimen) -> bool:
+    folder = material_folder(specimen)
+    return folder is not None and unconverged(folder)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpam_calib.report.free_read import free_read
+from mpam_calib.report.free_read import early_roots, free_read
 from mpam_calib.report.trust import assess
 from mpam_calib.report.view import CalibrationView
 
@@ -87,3 +87,11 @@ def test_readings_that_scatter_about_the_curve_do_not_contradict_it(sound: Calib
 
 def test_what_never_pulled_has_no_free_contraction_to_compare(sound: CalibrationView) -> None:
     assert free_read(read(sound, *(-0.08,) * 9, censored=True)) is None
+
+
+def test_draws_that_end_short_of_a_measured_free_contraction_are_a_caution(sound: CalibrationView) -> None:
+    assert early_roots(sound) is None
+    verdict = assess(replace(sound, early_roots=0.6))
+    assert verdict.level == "caution"
+    assert verdict.sentence.endswith("the simulation contradicts a measured free contraction.")
+    assert verdict.reasons[0].startswith("In 60 % of the draws the force is gone well short")

@@ -110,6 +110,14 @@ def test_separate_explanations_are_a_caution(sound: CalibrationView) -> None:
     assert "2 separate" in limit.sentence
 
 
+def test_moduli_of_a_run_that_has_not_settled_are_bad(sound: CalibrationView) -> None:
+    assert trust.borrowed(sound) is None
+    verdict = trust.assess(replace(sound, unsettled_moduli=True))
+    assert verdict.level == "bad"
+    assert verdict.sentence.endswith(": the run that the moduli come from did not converge.")
+    assert "--max-steps" in verdict.reasons[0]
+
+
 @pytest.mark.parametrize(
     ("remainder", "noise", "level"),
     [

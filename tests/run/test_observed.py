@@ -113,7 +113,8 @@ def test_a_static_reading_is_shown_with_the_level_it_is_nearest_to(calibration: 
     np.testing.assert_allclose(frame["pressure_kPa"], [104.0, 121.0, 131.0, 260.0])
 
 
-def test_a_free_contraction_is_shown_beside_that_of_the_fit() -> None:
+@pytest.fixture(scope="module")
+def read_too_far() -> Calibration:
     """A map tells the curve; the free contractions were all read 0.01 too far, one between the levels."""
     pressure, grid = np.repeat([1e5, 1.5e5, 2e5], 30), np.tile(np.linspace(0.0, 0.26, 30), 3)
     force = static_force(pressure / KPA, grid) + NOISE_N * np.random.default_rng(4).standard_normal(90)
@@ -127,8 +128,12 @@ def test_a_free_contraction_is_shown_beside_that_of_the_fit() -> None:
         free_contraction=FreeContraction(np.array([1e5, 1.25e5, 2e5]), true + 0.01),
         sensors=Sensors(force_sd_N=NOISE_N),
     )
-    found = calibrate(made, max_steps=60, ess_wanted=150.0, options=build.PLAIN)
-    rows = observed_readings(found)[0]
+    return calibrate(made, max_steps=60, ess_wanted=150.0, options=build.PLAIN)
+
+
+def test_a_free_contraction_is_shown_beside_that_of_the_fit(read_too_far: Calibration) -> None:
+    true = np.array([free_contraction(level) for level in (100.0, 125.0, 200.0)])
+    rows = observed_readings(read_too_far)[0]
     free = rows[rows["kind"] == "free_contraction"]
     np.testing.assert_allclose(free["contraction"], true + 0.01)
     np.testing.assert_allclose(free["fitted_N"], true, atol=0.004)
@@ -136,3 +141,14 @@ def test_a_free_contraction_is_shown_beside_that_of_the_fit() -> None:
     low, high = free["low_N"].to_numpy(), free["high_N"].to_numpy()
     np.testing.assert_allclose((low + high) / 2.0, true, atol=0.002)
     assert (high < true + 0.006).all()
+
+
+def test_the_page_knows_of_draws_that_end_short_of_a_free_contraction(read_too_far: Calibration) -> None:
+    """A quarter of the draws with moduli so large that the bladder holds the muscle back at once."""
+    draws = read_too_far.draws
+    eta = draws.eta.copy()
+    eta[::4] *= 30.0
+    bands = read_too_far.bands()
+    stiff = replace(read_too_far, draws=replace(draws, eta=eta))
+    assert view_of(read_too_far, bands).early_roots == 0.0
+    assert view_of(stiff, bands).early_roots == pytest.approx(0.25, abs=0.01)
