@@ -37,7 +37,7 @@ def in_kpa(levels: Array) -> Array:
 
 
 def observed_readings(calibration: Calibration) -> tuple[pd.DataFrame, float, float]:
-    """Reduced readings beside the declared simulation; the remainder's and the noise's size."""
+    """Reduced readings beside the declared simulation; the remainder's and the noise's size (nan: none)."""
     model, data = calibration.model, calibration.target.data
     draws = calibration.draws.thin(DRAWS)
     frames = []
@@ -53,7 +53,9 @@ def observed_readings(calibration: Calibration) -> tuple[pd.DataFrame, float, fl
     if data.tensile is not None and model.tensile is not None:
         frame, left = _tensile_frame(calibration, draws)
         frames.append(frame)
-    remainder = float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else float("nan")
+    # Without a remainder nothing says what the simulation misses: that is not nothing.
+    assessed = bool(squares) and model.remainder is not None
+    remainder = float(np.sqrt(np.mean(np.concatenate(squares)))) if assessed else float("nan")
     noise = noise_of(draws) if WHITE in draws.values else float("nan")
     if model.setting is None and MISFIT in draws.values:
         remainder = float(np.sqrt(np.mean(left)))

@@ -105,6 +105,14 @@ def test_what_the_simulation_misses_holds_each_stroke_s_own_part(calibration: Ca
     np.testing.assert_allclose(left - plain, 0.3**2)
 
 
+def test_what_the_simulation_misses_is_assessed_where_there_is_a_remainder(calibration: Calibration) -> None:
+    """Without one nothing can say so, and no number is not a miss of zero."""
+    assert np.isnan(observed_readings(calibration)[1])
+    options = build.PLAIN.model_copy(update={"remainder": True})
+    other = calibrate(calibration.specimen, max_steps=30, ess_wanted=50.0, options=options)
+    assert observed_readings(other)[1] > 0.0
+
+
 def test_a_static_reading_is_shown_with_the_level_it_is_nearest_to(calibration: Calibration) -> None:
     places = Readings.at_rest(np.array([104e3, 121e3, 131e3, 260e3]), np.zeros(4))
     frame = _frame("blocked_force", places, np.zeros(4), np.zeros(4, dtype=bool), calibration)
