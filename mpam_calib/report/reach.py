@@ -12,6 +12,8 @@ from mpam_calib.report.view import CalibrationView
 
 UNSEEN: Final = 0.1
 """Share of the free contraction that readings may end before, and yet come near it."""
+AT_LEVEL: Final = 0.01
+"""Share of a level by which a free contraction's own pressure may differ from it."""
 MOST: Final = ("all", "most")
 """Of the curves without a free contraction: where it is these, there is none to be stated."""
 CARRIED: Final = "the simulation carries the number there, not the data."
@@ -72,8 +74,12 @@ def between_ends(view: CalibrationView) -> Limit | None:
 
 def _unseen(view: CalibrationView, free: pd.Series) -> str:
     """That the readings at the top level end far before its free contraction, if they do."""
+    top = view.top_level_kPa
     rows = view.readings("loops", "force_map", "free_contraction")
-    furthest = rows.loc[rows["level_kPa"] == view.top_level_kPa, "contraction"].max()
+    rows = rows[rows["level_kPa"] == top]
+    # The level nearest to a free contraction's own pressure may be far from it.
+    elsewhere = (rows["kind"] == "free_contraction") & ((rows["pressure_kPa"] - top).abs() > AT_LEVEL * top)
+    furthest = rows.loc[~elsewhere, "contraction"].max()
     if furthest >= (1.0 - UNSEEN) * free["mean"]:
         return ""
     if pd.isna(furthest) or furthest <= 0.0:

@@ -242,7 +242,7 @@ CHECKS: tuple[Check, ...] = (
     ),
     Check(
         extrapolation,
-        f"nothing is extrapolated by more than {100 * UNSEEN:.0f} %",
+        f"no headline number is extrapolated by more than {100 * UNSEEN:.0f} %",
         lambda view: not view.tensile and cut_off(view) is None,
     ),
     Check(cut_off),

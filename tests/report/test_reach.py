@@ -43,6 +43,9 @@ def cut(view: CalibrationView, share: float, free: float = 0.0) -> CalibrationVi
 def test_only_the_top_level_counts(sound: CalibrationView) -> None:
     low, high = (flagged(cut(sound, 0.5), "free_contraction", level) for level in (50.0, 250.0))
     assert reach.extrapolation(low) is None
+    # Other levels may well be extrapolated: what is fine is said of the numbers in the headline alone.
+    assert "no headline number is extrapolated" in assess(low).reasons[-1]
+    assert "nothing is extrapolated" not in " ".join(assess(low).reasons)
     limit = reach.extrapolation(high)
     assert limit is not None and limit.level == "caution"
     assert "free contraction at 250 kPa" in limit.sentence
@@ -65,7 +68,7 @@ def test_how_far_the_readings_go_is_said_where_more_than_a_tenth_is_unseen(
     limit = reach.extrapolation(view)
     assert (limit.sentence if limit else "").startswith(told)
     assert (limit is not None) == bool(told)
-    assert ("nothing is extrapolated by more than 10 %" in assess(view).reasons[-1]) != bool(told)
+    assert ("no headline number is extrapolated by more than 10 %" in assess(view).reasons[-1]) != bool(told)
 
 
 def test_readings_of_other_levels_do_not_stand_in_for_the_top_one_s(sound: CalibrationView) -> None:
@@ -76,6 +79,19 @@ def test_readings_of_other_levels_do_not_stand_in_for_the_top_one_s(sound: Calib
     limit = reach.extrapolation(flagged(view, "free_contraction", 250.0))
     assert limit is not None
     assert limit.sentence.startswith("The readings go to 75 % of the free contraction at 250 kPa")
+
+
+@pytest.mark.parametrize(("pressure", "told"), [(230.0, True), (247.0, True), (248.0, False), (252.0, False)])
+def test_a_free_contraction_read_at_another_pressure_is_not_that_of_the_top_level(
+    sound: CalibrationView, pressure: float, told: bool
+) -> None:
+    view = flagged(cut(sound, 0.5, 0.98), "free_contraction", 250.0)
+    observed = view.observed.copy()
+    observed.loc[observed["kind"] == "free_contraction", "pressure_kPa"] = pressure
+    limit = reach.extrapolation(replace(view, observed=observed))
+    assert (limit is not None) == told
+    if limit is not None:
+        assert limit.sentence.startswith("The readings go to 50 % of the free contraction at 250 kPa")
 
 
 def test_a_pressure_beyond_the_readings(sound: CalibrationView) -> None:
