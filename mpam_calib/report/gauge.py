@@ -38,8 +38,11 @@ def gauge(view: CalibrationView) -> Limit | None:
     if offset is None:
         return _open(-Z90 * declared * slope, Z90 * declared * slope, half, f"{declared:g}")
     low, high = -slope * float(offset["q95"]), -slope * float(offset["q05"])
-    if offset["sd"] <= LEARNT * declared and low * high > 0.0:
+    learnt = offset["sd"] <= LEARNT * declared
+    if learnt and low * high > 0.0:
         return _found(offset, slope, half)
+    if learnt and high - low <= 2.0 * TAKEN_UP * half:
+        return _narrowed(offset, (high - low) / 2.0, half)
     return _open(low, high, half, f"{declared:g} and the readings")
 
 
@@ -69,6 +72,18 @@ def _open(low: float, high: float, half: float, by: str) -> Limit | None:
         "loops do not help; a better gauge does."
     )
     return Limit("good", sentence, "the pressure gauge sets the width of the band")
+
+
+def _narrowed(offset: pd.Series, newtons: float, half: float) -> Limit | None:
+    """An offset about zero that the readings have told: it is worth ± ``newtons`` (90 %)."""
+    if newtons < SHARE * half:
+        return None
+    size = f"± {significant(float(offset['q95'] - offset['q05']) / 2.0, 2)} kPa"
+    sentence = (
+        f"By these readings the pressure gauge's offset is known to {size} (90 %), worth "
+        f"± {significant(newtons, 2)} N: more readings narrow it, and so does a gauge that is known better."
+    )
+    return Limit("good", sentence, f"the pressure gauge's offset is known to {size}")
 
 
 def _found(offset: pd.Series, slope: float, half: float) -> Limit | None:

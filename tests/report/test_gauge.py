@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from mpam_calib.report.gauge import gauge
+from mpam_calib.report.numbers import significant
 from mpam_calib.report.view import CalibrationView
 
 from .synthetic import muscle
@@ -65,3 +66,27 @@ def test_one_that_sets_the_width_does_so_by_what_the_fit_leaves_of_it(sound: Cal
     sd = half / (1.645 * SLOPE)
     limit = gauge(sampled(replace(sound, pressure_bias_sd_kPa=1.2 * sd), 0.0, sd))
     assert limit is not None and "sets the width" in limit.sentence
+
+
+@pytest.mark.parametrize(("declared", "sets"), [(2.1, False), (1.9, True)])
+def test_an_offset_about_zero_that_the_readings_told_is_narrowed_by_more_of_them(
+    sound: CalibrationView, declared: float, sets: bool
+) -> None:
+    """The fit leaves a little less than half of the declared sd, or a little more."""
+    rows = sound.quantity("blocked_force_N")
+    half = float(rows["q95"].iloc[-1] - rows["q05"].iloc[-1]) / 2.0
+    sd = half / (1.645 * SLOPE)
+    limit = gauge(sampled(replace(sound, pressure_bias_sd_kPa=declared * sd), 0.0, sd))
+    assert limit is not None and limit.level == "good"
+    assert ("sets the width" in limit.brief) == ("More loops do not help" in limit.sentence) == sets
+    assert ("more readings narrow it" in limit.sentence) != sets
+    if not sets:
+        # 1.645 sds of it are worth half the band.
+        assert f"is known to ± {significant(1.645 * sd, 2)} kPa (90 %)" in limit.sentence
+
+
+def test_one_that_they_told_too_well_to_matter_is_not_told(sound: CalibrationView) -> None:
+    rows = sound.quantity("blocked_force_N")
+    half = float(rows["q95"].iloc[-1] - rows["q05"].iloc[-1]) / 2.0
+    for share, told in ((0.4, False), (0.7, True)):
+        assert (gauge(sampled(sound, 0.0, share * half / (1.645 * SLOPE))) is not None) == told
