@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import Final
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from mpam_calib.model.nuisance import BIAS
 from mpam_calib.report.doubts import Z90
 from mpam_calib.report.limit import Limit
 from mpam_calib.report.numbers import significant, with_band
 from mpam_calib.report.view import CalibrationView
+
+Array = NDArray[np.float64]
 
 SHARE: Final = 0.5
 """The gauge limits the result when its offset makes up this share of the band ..."""
@@ -27,13 +31,12 @@ def gauge(view: CalibrationView) -> Limit | None:
         return None
     rows = view.quantity("blocked_force_N")
     rows = rows[rows["pressure_kPa"] <= view.top_level_kPa * (1 + 1e-9)]
-    if len(rows) < 2:
+    if rows.empty:
         return None
-    P, F = rows["pressure_kPa"].to_numpy(), rows["mean"].to_numpy()
-    slope = abs(float(F[-1] - F[-2]) / float(P[-1] - P[-2])) if P[-1] > P[-2] else 0.0
     half = float(rows["q95"].iloc[-1] - rows["q05"].iloc[-1]) / 2.0
     if half <= 0:
         return None
+    slope = _slope(rows["pressure_kPa"].to_numpy(), rows["mean"].to_numpy())
     declared, offset = view.pressure_bias_sd_kPa, _sampled(view)
     if offset is None:
         return _open(-Z90 * declared * slope, Z90 * declared * slope, half, f"{declared:g}")
@@ -44,6 +47,12 @@ def gauge(view: CalibrationView) -> Limit | None:
     if learnt and high - low <= 2.0 * TAKEN_UP * half:
         return _narrowed(offset, (high - low) / 2.0, half)
     return _open(low, high, half, f"{declared:g} and the readings")
+
+
+def _slope(pressure: Array, force: Array) -> float:
+    """Of the blocked force (N/kPa) at the highest pressure; of one level, that of a line through zero."""
+    P, F = np.append(0.0, pressure), np.append(0.0, force)
+    return abs(float(F[-1] - F[-2]) / float(P[-1] - P[-2])) if P[-1] > P[-2] else 0.0
 
 
 def _sampled(view: CalibrationView) -> pd.Series | None:
@@ -83,7 +92,7 @@ def _narrowed(offset: pd.Series, newtons: float, half: float) -> Limit | None:
         f"By these readings the pressure gauge's offset is known to {size} (90 %), worth "
         f"± {significant(newtons, 2)} N: more readings narrow it, and so does a gauge that is known better."
     )
-    return Limit("good", sentence, f"the pressure gauge's offset is known to {size}")
+    return Limit("good", sentence, f"the pressure gauge's offset is known to {size} only")
 
 
 def _found(offset: pd.Series, slope: float, half: float) -> Limit | None:

@@ -79,7 +79,7 @@ def test_an_offset_about_zero_that_the_readings_told_is_narrowed_by_more_of_them
     limit = gauge(sampled(replace(sound, pressure_bias_sd_kPa=declared * sd), 0.0, sd))
     assert limit is not None and limit.level == "good"
     assert ("sets the width" in limit.brief) == ("More loops do not help" in limit.sentence) == sets
-    assert ("more readings narrow it" in limit.sentence) != sets
+    assert limit.brief.endswith("kPa only") == ("more readings narrow it" in limit.sentence) != sets
     if not sets:
         # 1.645 sds of it are worth half the band.
         assert f"is known to ± {significant(1.645 * sd, 2)} kPa (90 %)" in limit.sentence
@@ -90,3 +90,12 @@ def test_one_that_they_told_too_well_to_matter_is_not_told(sound: CalibrationVie
     half = float(rows["q95"].iloc[-1] - rows["q05"].iloc[-1]) / 2.0
     for share, told in ((0.4, False), (0.7, True)):
         assert (gauge(sampled(sound, 0.0, share * half / (1.645 * SLOPE))) is not None) == told
+
+
+def test_one_level_tells_the_slope_of_a_line_through_zero(sound: CalibrationView) -> None:
+    """(250 − 9) 0.39 N at 250 kPa: 0.376 N/kPa, beside 0.39 between two levels."""
+    one = replace(sound, bands=sound.bands[sound.bands["pressure_kPa"] == 250.0], levels_kPa=(250.0,))
+    for view, newtons in ((sound, 0.39), (one, 241.0 / 250.0 * 0.39)):
+        limit = gauge(sampled(view, -15.0, 0.12))
+        assert limit is not None
+        assert f"is about {significant(15.0 * newtons, 2)} N higher" in limit.sentence
