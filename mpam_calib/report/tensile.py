@@ -10,6 +10,7 @@ from markupsafe import Markup
 from mpam_calib.report import wording
 from mpam_calib.report.figures import residuals, strain_range
 from mpam_calib.report.figures import tensile as stress_strain
+from mpam_calib.report.headline import first_modulus, stresses
 from mpam_calib.report.numbers import with_band
 from mpam_calib.report.page import (
     Block,
@@ -28,18 +29,14 @@ from mpam_calib.report.view import CalibrationView
 
 def tensile_lead(view: CalibrationView) -> list[Block]:
     """First screen: the stress at two strains, the first modulus, and whether to trust them."""
-    rows = view.stress()
-    top, middle = rows.iloc[-1], rows.iloc[(len(rows) - 1) // 2]
     cards, parts = [], []
-    for row in (middle, top):
+    for row in stresses(view):
         value, band = with_band(*(1e-3 * float(row[q]) for q in ("mean", "q05", "q95", "q50")))
         strain = f"{row['contraction']:.3g}"
         parts.append(spoken(value, band, "kPa", f" at a strain of {strain}"))
         cards.append(KeyNumber(f"Stress at strain {strain}", value, "kPa", f"90 % band: {band} kPa"))
-    first = view.summary[view.summary["parameter"] == "E_1"]
-    if len(first):
-        row = first.iloc[0]
-        value, band = with_band(*(1e-3 * float(row[q]) for q in ("mean", "q05", "q95", "q50")))
+    if (first := first_modulus(view)) is not None:
+        value, band = with_band(*(1e-3 * float(first[q]) for q in ("mean", "q05", "q95", "q50")))
         engineering = view.simulation.strain == "engineering"
         hint = "slope at small strain" if engineering else "a coefficient in the stretch, not a slope"
         cards.append(KeyNumber("First modulus E_1", value, "kPa", f"90 % band: {band} kPa", hint))

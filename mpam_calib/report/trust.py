@@ -15,6 +15,7 @@ from mpam_calib.report.blocks import Level, Verdict
 from mpam_calib.report.doubts import look_first, overruled_slack, wandering
 from mpam_calib.report.free_read import early_roots, free_read
 from mpam_calib.report.gauge import gauge
+from mpam_calib.report.headline import FIRST_MODULUS, headline_bands
 from mpam_calib.report.held import (
     Held,
     along_stroke,
@@ -29,7 +30,7 @@ from mpam_calib.report.limit import Limit
 from mpam_calib.report.noise_size import NOISE_CAUTION, lasting_noise, noise_as_declared, noise_size
 from mpam_calib.report.numbers import significant
 from mpam_calib.report.one_branch import one_branch
-from mpam_calib.report.reach import UNSEEN, between_ends, cut_off, extrapolation, still_pulling
+from mpam_calib.report.reach import UNSEEN, between_ends, cut_off, extrapolation
 from mpam_calib.report.view import CalibrationView
 
 REMAINDER_CAUTION: Final = 0.02
@@ -115,18 +116,22 @@ def _advice(view: CalibrationView) -> str:
 
 def band_width(view: CalibrationView) -> Limit | None:
     """The band of a headline number is wide."""
-    worst, words = 0.0, ""
+    found = []
     for name, mean, low, high in headline_bands(view):
         half = (high - low) / 2.0
         relative = half / abs(mean) if mean else math.inf if half else 0.0
-        if relative > worst:
-            worst, words = relative, f"the {name} is known to ± {100 * relative:.0f} % only"
-    if worst <= WIDE_CAUTION:
+        # Moduli that the readings do not tell apart may still give a stress that is well known.
+        bad = relative > WIDE_BAD and name != FIRST_MODULUS
+        if relative > WIDE_CAUTION:
+            found.append((bad, relative, f"the {name} is known to ± {100 * relative:.0f} % only"))
+    if not found:
         return None
-    level: Level = "bad" if worst > WIDE_BAD else "caution"
+    bad, worst, words = max(found)
     if math.isinf(worst):
         words = "a headline number is zero within its band"
-    return Limit(level, f"{words[0].upper()}{words[1:]} (half of its 90 % band).", words)
+    return Limit(
+        "bad" if bad else "caution", f"{words[0].upper()}{words[1:]} (half of its 90 % band).", words
+    )
 
 
 def identification(view: CalibrationView) -> Limit | None:
@@ -293,22 +298,6 @@ def _sentence(level: Level, limits: list[Limit]) -> str:
     if limits:
         return f"Yes, you can use these numbers with their bands; but {limits[0].brief}."
     return "Yes: you can use these numbers with their bands."
-
-
-def headline_bands(view: CalibrationView) -> list[tuple[str, float, float, float]]:
-    """Name, mean, q05 and q95 of each headline number whose band has two ends, in its own unit."""
-    if view.tensile:
-        rows = view.stress()
-        chosen = [("stress at the largest strain", rows.iloc[-1])]
-    else:
-        pairs = (("blocked force", "blocked_force_N"), ("free contraction", "free_contraction"))
-        chosen = []
-        for words, quantity in pairs:
-            row = view.at_level(quantity, view.top_level_kPa)
-            endless = quantity == "free_contraction" and still_pulling(view, row)
-            if row is not None and not endless:
-                chosen.append((words, row))
-    return [(words, float(row["mean"]), float(row["q05"]), float(row["q95"])) for words, row in chosen]
 
 
 def unidentified_names(view: CalibrationView) -> list[str]:

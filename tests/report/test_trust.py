@@ -270,6 +270,50 @@ def test_a_material_is_judged_on_its_stress() -> None:
     assert "tensile_strain" in limit.sentence and "diagnose" not in limit.sentence
 
 
+def of_material(view: CalibrationView, name: str, half: float) -> CalibrationView:
+    """A material's page on which one of its three numbers is known to ± so much of it."""
+    q = {"mean": 1.0, "q05": 1.0 - half, "q95": 1.0 + half}
+    if name == "E_1":
+        summary = view.summary.copy()
+        rows = summary["parameter"] == name
+        summary.loc[rows, list(q)] = [8e4 * x for x in q.values()]
+        return replace(view, summary=summary)
+    bands = view.bands.copy()
+    rows = (bands["contraction"] - float(name)).abs() < 1e-9
+    bands.loc[rows, list(q)] = bands.loc[rows, ["mean"] * 3].to_numpy() * list(q.values())
+    return replace(view, bands=bands)
+
+
+@pytest.mark.parametrize(
+    ("name", "half", "level", "told"),
+    [
+        ("3", 0.15, "caution", "stress at the largest strain"),
+        ("3", 0.40, "bad", "stress at the largest strain"),
+        ("1.5", 0.15, "caution", "stress at a strain of 1.5"),
+        ("1.5", 0.40, "bad", "stress at a strain of 1.5"),
+        ("E_1", 0.08, None, ""),
+        ("E_1", 0.15, "caution", "first modulus E_1"),
+        ("E_1", 0.40, "caution", "first modulus E_1"),  # the stresses are known all the same
+    ],
+)
+def test_every_number_on_a_material_s_first_screen_is_judged(
+    name: str, half: float, level: str | None, told: str
+) -> None:
+    view = of_material(material(n_draws=400), name, half)
+    limit = trust.band_width(view)
+    assert (limit.level if limit else None) == level
+    assert ("the bands are within ± 10 %" in trust.assess(view).reasons[-1]) == (level is None)
+    if limit:
+        assert limit.brief == f"the {told} is known to ± {100 * half:.0f} % only"
+
+
+def test_a_wide_modulus_hides_no_wide_stress() -> None:
+    view = of_material(of_material(material(n_draws=400), "E_1", 0.5), "3", 0.4)
+    limit = trust.band_width(view)
+    assert limit is not None and limit.level == "bad"
+    assert limit.brief == "the stress at the largest strain is known to ± 40 % only"
+
+
 def test_a_muscle_with_a_tensile_test_is_judged_in_newtons(sound: CalibrationView) -> None:
     bands = pd.concat([sound.bands, material(n_draws=400).bands])
     view = replace(sound, bands=bands, remainder=40.0)
