@@ -36,7 +36,9 @@ def simulation_sentence(simulation: Simulation) -> str:
     """The declared simulation of a muscle in one sentence."""
     each = simulation.friction_by_pressure and simulation.friction != "none"
     per_level = ", one value per level" if each else ""
-    if simulation.moduli == "tensile":
+    if simulation.moduli == "tensile" and simulation.E_Pa is not None:
+        moduli = _declared_moduli(simulation.E_Pa, simulation.E_rel_sd or 0.0)
+    elif simulation.moduli == "tensile":
         moduli = "the bladder's stiffness comes from a tensile test"
     elif simulation.moduli.startswith("run:"):
         moduli = f"the bladder's stiffness comes from the run {simulation.moduli.removeprefix('run:')}"
@@ -50,6 +52,12 @@ def simulation_sentence(simulation: Simulation) -> str:
         f"The simulation: {_KINEMATICS[simulation.kinematics]}; {moduli}; {_FRICTION[simulation.friction]}"
         f"{per_level}; further effects: {effects}."
     )
+
+
+def _declared_moduli(E_Pa: tuple[float, ...], sd: float) -> str:
+    listed = ", ".join(f"E_{k} = {1e-3 * E:.4g} kPa".replace("-", "−") for k, E in enumerate(E_Pa, start=1))
+    known = "taken as exact" if sd == 0.0 else f"known but for one common factor of sd {100 * sd:.3g} %"
+    return f"the bladder's moduli are declared: {listed}, {known}"
 
 
 def material_sentence(simulation: Simulation) -> str:

@@ -17,6 +17,7 @@ from mpam_calib.report.numbers import with_band
 from mpam_calib.report.page import DataTable, Text
 from mpam_calib.report.parameters import learnt_table, summary_table
 from mpam_calib.report.view import CalibrationView
+from mpam_calib.report.wording import simulation_sentence
 from mpam_calib.specimen.declaration import Simulation
 
 from .synthetic import material, muscle
@@ -324,3 +325,23 @@ def test_every_reading_has_its_place_beside_the_curves(
         assert dots == [style.BRANCH_COLOURS[branch or "mean"] for branch in branches]
         written = [text.get_text() for text in panel.texts]
         assert written == (labels if panel.get_title(loc="left") == "50 kPa" else [])
+
+
+@pytest.mark.parametrize(
+    ("declared", "words"),
+    [
+        ({}, "the bladder's stiffness comes from a tensile test; "),
+        (
+            {"E_Pa": (4.0e4, -2.6e3), "E_rel_sd": 0.1},
+            "the bladder's moduli are declared: E_1 = 40 kPa, E_2 = −2.6 kPa, known but for one common "
+            "factor of sd 10 %; ",
+        ),
+        (
+            {"E_Pa": (4.0e4,), "E_rel_sd": 0.0},
+            "the bladder's moduli are declared: E_1 = 40 kPa, taken as exact; ",
+        ),
+    ],
+)
+def test_declared_moduli_are_not_called_a_tensile_test(declared: dict[str, object], words: str) -> None:
+    simulation = Simulation(moduli="tensile", law="constant", **declared)
+    assert words in simulation_sentence(simulation)
