@@ -188,8 +188,8 @@ def test_what_another_process_is_writing_is_not_swept(tmp_path: Path) -> None:
     code = (
         "import sys; from pathlib import Path;"
         "from mpam_calib.posterior.chains.checkpoint import write_atomically;"
-        "write_atomically(Path(sys.argv[1]), lambda p: (print('begun', flush=True), sys.stdin.read(),"
-        "p.write_text('whole')))"
+        "write_atomically(Path(sys.argv[1]), lambda p: (p.write_text('whole'), print('begun', flush=True),"
+        "sys.stdin.read()))"
     )
     pipe = subprocess.PIPE
     with subprocess.Popen([sys.executable, "-c", code, str(table)], stdin=pipe, stdout=pipe) as writer:
