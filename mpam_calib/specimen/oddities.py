@@ -56,7 +56,7 @@ def oddities(specimen: Specimen) -> list[str]:
             remarks.append(f"loops: {len(loops.force_N)} readings; so few hardly contradict any simulation")
         remarks += _odd_times(loops)
         remarks += _odd_speeds(loops)
-        remarks += _odd_cycles(loops)
+        remarks += _odd_cycles(loops) + _cycles_that_go_on(loops, specimen.levels_Pa)
         remarks += _odd_levels(loops, specimen.levels_Pa)
         remarks += odd_readings(loops, specimen.levels_Pa)
     if specimen.force_map is not None:
@@ -121,6 +121,21 @@ def _odd_cycles(loops: Loops) -> list[str]:
     return [
         f"loops: the column cycle counts down ({down} of {changes} changes within a level); does 1 stand for "
         "the first cycle?"
+    ]
+
+
+def _cycles_that_go_on(loops: Loops, levels_Pa: Floats) -> list[str]:
+    """Cycles that are numbered through the whole test: most levels begin with the next number."""
+    sure = loops.clear  # a row that is another level's has its cycle, too
+    levels, first = np.unique(sure.level, return_index=True)
+    later = np.argsort(first)[1:]
+    lowest = {place: int(sure.cycle[sure.level == levels[place]].min()) for place in later}
+    on = [place for place, number in lowest.items() if number == sure.cycle[: first[place]].max() + 1]
+    if 2 * len(on) <= len(later):
+        return []
+    return [
+        f"loops: cycle goes on from level to level ({levels_Pa[levels[on[0]]] / KPA:.4g} kPa begins with "
+        f"{lowest[on[0]]}); does it count from 1 within each level?"
     ]
 
 

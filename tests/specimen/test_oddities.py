@@ -184,6 +184,32 @@ def test_cycles_that_count_down_are_said_to(number: Callable[[int], int], said: 
 
 
 @pytest.mark.parametrize(
+    ("levels", "before", "said"),
+    [
+        pytest.param((50.0, 100.0, 150.0), (0, 0, 0), "", id="from 1 at each level"),
+        pytest.param((50.0, 100.0, 150.0), (1, 1, 1), "", id="from 2 at each level"),
+        pytest.param((50.0, 100.0, 150.0), (0, 3, 6), "100 kPa begins with 4", id="through the test"),
+        pytest.param((150.0, 100.0, 50.0), (0, 3, 6), "100 kPa begins with 4", id="downwards"),
+        pytest.param((50.0, 100.0, 50.0, 150.0), (0, 3, 6, 9), "100 kPa begins with 4", id="a level again"),
+        pytest.param((50.0, 100.0, 50.0, 150.0), (0, 0, 3, 0), "", id="a level again, each from 1"),
+        pytest.param((50.0,), (3,), "", id="one level"),
+    ],
+)
+def test_cycles_that_go_on_from_level_to_level_are_asked_about(
+    levels: tuple[float, ...], before: tuple[int, ...], said: str, tmp_path: Path
+) -> None:
+    parts = [loops((level,), cycles=3) for level in levels]
+    cycle = np.concatenate([part.cycle + more for part, more in zip(parts, before, strict=True)])
+    lines = loops(levels, cycles=3).text().splitlines()
+    rows = [f"{line},{number}" for line, number in zip(lines[1:], cycle, strict=True)]
+    text = DECLARATION.replace('law = "linear"', 'law = "constant"')
+    folder = make(tmp_path, text, loops="\n".join([lines[0] + ",cycle", *rows]) + "\n")
+    found = " ".join(oddities(read(folder)))
+    assert (f"loops: cycle goes on from level to level ({said}); does it count from 1" in found) == bool(said)
+    assert ("goes on" in found) == bool(said)
+
+
+@pytest.mark.parametrize(
     ("simulation", "said"),
     [
         (
