@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -21,7 +21,18 @@ COARSE = 0.05
 """Share of rows that repeat the time of the row before, from which the clock is coarse; fewer are a slip."""
 COPIED = 0.5
 """Share of such rows that repeat everything else as well, from which rows were written twice."""
+FIRST = 1 << 16
+"""Rows of a file that tell its clock's usual tick, wherever blocks end."""
+PAUSE = 2.0
+"""Times what a tick's readings usually take, from which there is a pause behind them."""
 EXPECTED = "a time later than the row before's (a list in [files] where each has its own clock)"
+
+
+class Usual(NamedTuple):
+    """How long (s) a tick that readings share usually is, and the step from one of them to the next."""
+
+    tick: float
+    step: float
 
 
 @dataclass
@@ -29,7 +40,7 @@ class Clock:
     """The blocks of a file on a strictly forward clock.
 
     A clock that is written with fewer digits than the readings need repeats itself; the readings of such a
-    tick are taken to be evenly spaced up to the next.
+    tick are taken to be evenly spaced up to the next, or up to a pause.
     """
 
     file: DataFile
@@ -46,24 +57,32 @@ class Clock:
         where most repeat the whole row, and where the time never changes.
         """
         rest: pd.DataFrame | None = None
+        usual: Usual | None = None
         tick = 0.0
         for block in self.file.blocks():
             whole = block if rest is None else pd.concat([rest, block])
             self._count(whole, 0 if rest is None else len(rest))
+            if self.rows < FIRST:
+                rest = whole
+                continue
             time = whole["time_s"].to_numpy()
+            usual = usual or usual_tick(time[:FIRST])
             # The last tick of a block may go on in the next.
             last = int(np.searchsorted(time, time[-1]))
             tick = float(time[last] - time[last - 1]) if last else tick
             rest = whole.iloc[last:]
             if last:
-                yield whole.iloc[:last].assign(time_s=spread_ticks(time[:last], float(time[last])))
+                yield whole.iloc[:last].assign(time_s=spread_ticks(time[:last], float(time[last]), usual))
         assert rest is not None  # a file without rows is refused
         self._refuse_slips()
+        time = rest["time_s"].to_numpy()
+        last = int(np.searchsorted(time, time[-1]))
+        tick = float(time[last] - time[last - 1]) if last else tick
         if self.repeated and not tick:
-            found = f"{rest['time_s'].iloc[0]:.10g} in every row (a clock that stands still)"
+            found = f"{time[0]:.10g} in every row (a clock that stands still)"
             raise InputError(self.file.label, found, EXPECTED, None, "time_s")
-        start = float(rest["time_s"].iloc[0])
-        yield rest.assign(time_s=spread_ticks(rest["time_s"].to_numpy(), start + (tick or 1.0)))
+        end = float(time[-1]) + (tick or 1.0)
+        yield rest.assign(time_s=spread_ticks(time, end, usual or usual_tick(time)))
 
     @property
     def coarse(self) -> bool:
@@ -97,12 +116,28 @@ class Clock:
             raise InputError(self.file.label, found, EXPECTED, row, "time_s")
 
 
-def spread_ticks(time: Floats, end: float) -> Floats:
-    """Readings at equal times (n,), s, evenly spaced up to the next time, the last of them up to ``end``."""
+def usual_tick(time: Floats) -> Usual:
+    """What is usual of a clock's times (n,), s; without bound where no readings share a tick."""
+    starts = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0.0)
+    lengths, sizes = np.diff(time[starts]), np.diff(starts)
+    shared = sizes > 1
+    if not shared.any():
+        return Usual(np.inf, np.inf)
+    return Usual(float(np.median(lengths[shared])), float(np.median((lengths / sizes)[shared])))
+
+
+def spread_ticks(time: Floats, end: float, usual: Usual) -> Floats:
+    """Readings at equal times (n,), s, evenly spaced up to the next time, the last of them up to ``end``.
+
+    Where there is a pause before the next, over what such a tick usually takes.
+    """
     starts = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0.0)
     if len(starts) == len(time):
         return time
     sizes = np.diff(np.append(starts, len(time)))
     lengths = np.diff(np.append(time[starts], end))
+    # Where a buffer was late, a tick holds as many readings more as it is longer.
+    longest = np.maximum(usual.tick, usual.step * sizes)
+    lengths = np.where(lengths > PAUSE * longest, longest, lengths)
     within = np.arange(len(time)) - np.repeat(starts, sizes)
     return time + np.repeat(lengths / sizes, sizes) * within

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from mpam_calib.errors import InputError
-from mpam_calib.specimen import blocks, read
-from mpam_calib.specimen.clock import spread_ticks
+from mpam_calib.specimen import blocks, clock, read
+from mpam_calib.specimen.clock import Usual, spread_ticks, usual_tick
 
 from .folders import Recording, loops, make
 
@@ -28,8 +28,34 @@ def on_ticks(made: Recording) -> Recording:
 
 def test_readings_of_a_tick_are_spread_over_it() -> None:
     time = np.array([1.0, 1.0, 2.0, 3.0, 3.0, 3.0, 3.0])
-    assert spread_ticks(time, 5.0).tolist() == [1.0, 1.5, 2.0, 3.0, 3.5, 4.0, 4.5]
-    assert spread_ticks(time[1:4], 4.0).tolist() == [1.0, 2.0, 3.0]
+    usual = Usual(1.0, 0.5)
+    assert spread_ticks(time, 5.0, usual).tolist() == [1.0, 1.5, 2.0, 3.0, 3.5, 4.0, 4.5]
+    assert spread_ticks(time[1:4], 4.0, usual).tolist() == [1.0, 2.0, 3.0]
+
+
+def test_readings_before_a_pause_are_not_spread_over_it() -> None:
+    """A late buffer that holds as many readings more is no pause."""
+    pause = np.array([0.0, 0.0, 1.0, 1.0, 60.0, 60.0, 61.0])
+    late = np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 5.0, 5.0, 6.0])
+    assert usual_tick(pause) == usual_tick(late) == Usual(1.0, 0.5)
+    assert spread_ticks(pause, 62.0, usual_tick(pause)).tolist() == [0.0, 0.5, 1.0, 1.5, 60.0, 60.5, 61.0]
+    assert np.diff(spread_ticks(late, 7.0, usual_tick(late)))[:-1] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("size", [blocks.BLOCK_BYTES, 1 << 10])
+@pytest.mark.parametrize("rows", [clock.FIRST, 200])
+def test_a_pause_on_a_coarse_clock_stays_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int, rows: int
+) -> None:
+    """Also behind the last tick but one, and wherever blocks end."""
+    monkeypatch.setattr(blocks, "BLOCK_BYTES", size)
+    monkeypatch.setattr(clock, "FIRST", rows)
+    made = recording()
+    later = np.searchsorted([len(made.time) // 3, len(made.time) - 3], np.arange(len(made.time)), "right")
+    paused = replace(made, time=made.time + 60.03 * later)
+    found = read(make(tmp_path, loops=on_ticks(paused).text())).loops
+    assert found is not None
+    assert found.time_s == pytest.approx(paused.time, abs=TICK)
 
 
 @pytest.mark.parametrize("size", [blocks.BLOCK_BYTES, 1 << 10])
