@@ -36,7 +36,7 @@ class ForceMapRead:
 
 def read_force_map(files: Sequence[DataFile], geometry: Geometry, floor_N: float | None) -> ForceMapRead:
     """Read force maps; repeated readings of one point stay separate rows, each with its own noise."""
-    frames = _frames(files, geometry)
+    frames = _frames(files, geometry, floor_N)
     rows = pd.concat(frames, ignore_index=True)
     pressure = rows["pressure_kPa"].to_numpy() * KPA
     level = static_levels(pressure)
@@ -56,7 +56,7 @@ def read_blocked_force(
     files: Sequence[DataFile], geometry: Geometry, floor_N: float | None
 ) -> tuple[BlockedForce, tuple[int, ...]]:
     """Read blocked forces, and the number of rows of each file."""
-    frames = _frames(files, geometry)
+    frames = _frames(files, geometry, floor_N)
     rows = pd.concat(frames, ignore_index=True)
     blocked = BlockedForce(
         rows["pressure_kPa"].to_numpy() * KPA, rows["force_N"].to_numpy(), censored_rows(rows, floor_N)
@@ -91,7 +91,9 @@ def read_tensile(files: Sequence[DataFile]) -> tuple[Tensile, tuple[int, ...]]:
     return Tensile(rows["strain"].to_numpy(), rows["stress_Pa"].to_numpy()), tuple(map(len, frames))
 
 
-def _frames(files: Sequence[DataFile], geometry: Geometry) -> list[pd.DataFrame]:
+def _frames(
+    files: Sequence[DataFile], geometry: Geometry, floor_N: float | None = None
+) -> list[pd.DataFrame]:
     frames = []
     for file in files:
         frame = file.whole()
@@ -99,7 +101,10 @@ def _frames(files: Sequence[DataFile], geometry: Geometry) -> list[pd.DataFrame]
         check_codes(file.label, frame)
         check_pressure(file.label, file.kind, frame["pressure_kPa"].to_numpy() * KPA, rows)
         if "force_N" in frame:
-            check_force(file.label, file.kind, frame["force_N"].to_numpy())
+            # Zeros that a slack muscle reads say nothing of the sign.
+            pulls = frame["force_N"].to_numpy()[~censored_rows(frame, floor_N)]
+            if len(pulls):
+                check_force(file.label, file.kind, pulls)
         if "contraction" in frame:
             contraction = frame["contraction"].to_numpy()
             check_contraction(file.label, contraction, rows, geometry, file.kind, "contraction")

@@ -152,6 +152,20 @@ def test_such_a_code_in_a_force_map_and_a_tensile_test(tmp_path: Path) -> None:
     assert message.startswith("t.csv:3:stress_Pa: found 9.9e+37 (a code for no reading?)")
 
 
+@pytest.mark.parametrize("kind", ["force_map", "blocked_force"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_slack_rows_say_nothing_of_a_force_s_sign(kind: str, sign: float, tmp_path: Path) -> None:
+    """Zeros of a slack muscle are more than half of the rows."""
+    lengths = {"force_map": ("contraction,", "0.05,"), "blocked_force": ("", "")}[kind]
+    rows = [f"50,{lengths[1]}0,1"] * 8 + [f"{p},{lengths[1]}{sign * p / 5},0" for p in (100, 150, 200)]
+    text = "\n".join([f"pressure_kPa,{lengths[0]}force_N,censored", *rows]) + "\n"
+    folder = make(tmp_path, MAP.replace("force_map", kind), **{kind: text})
+    if sign > 0.0:
+        assert read(folder).has_muscle_data
+    else:
+        assert f"{kind}.csv:force_N: found a median force of -30 N (flipped sign?)" in refused(folder)
+
+
 @pytest.mark.parametrize(
     ("strains", "said"),
     [
