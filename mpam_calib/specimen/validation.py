@@ -70,6 +70,8 @@ def _in_our_words(source: TomlSource, error: ErrorDetails) -> InputError:
         where = f"[{'.'.join(table)}]" if table else "the file"
         what = f'the unknown key "{name}"' if not isinstance(value, dict) else f"the unknown table [{name}]"
         return fault(source, keys, what + did_you_mean(name, known), f"in {where} one of {listed(known)}")
+    if name == "tensile_strain" and kind in ("missing", "too_long"):
+        return fault(source, keys, f"a list of {len(value)}", "two numbers, from and to")
     if kind == "missing":
         return _missing(source, keys)
     found = shown(value)

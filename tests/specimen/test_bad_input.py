@@ -325,6 +325,15 @@ CASES: dict[str, tuple[Spoil, list[str]]] = {
     ),
     "E_Pa with free moduli": (append("E_Pa = [4e4]\n"), ['E_Pa with moduli = "loops"']),
     "strain range upside down": (append("[fit]\ntensile_strain = [3.0, 0.1]\n"), ["[3, 0.1]"]),
+    "strain range of one": (
+        append("[fit]\ntensile_strain = [0.1]\n"),
+        ["specimen.toml:18:fit.tensile_strain: found a list of 1, expected two numbers, from and to"],
+    ),
+    "strain range of none": (append("[fit]\ntensile_strain = []\n"), ["a list of 0, expected two numbers"]),
+    "strain range of three": (
+        append("[fit]\ntensile_strain = [0.1, 1.0, 3.0]\n"),
+        ["a list of 3, expected two"],
+    ),
     "mapped column missing": (
         append('[columns.loops]\nforce_N = "Load"\n'),
         ["loops.csv:1:force_N: ", 'a column "Load" (for force_N)'],
