@@ -9,7 +9,7 @@ from typing import Any
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import E_REL_SD, Declaration, Simulation
-from mpam_calib.specimen.recording import Floats
+from mpam_calib.specimen.recording import Floats, Tensile
 from mpam_calib.specimen.toml_source import TomlSource
 from mpam_calib.specimen.validation import fault
 from mpam_calib.units import KPA
@@ -161,8 +161,26 @@ def least_parameters(simulation: Simulation, levels: int) -> int:
 def check_rows(label: str, rows: int, parameters: int) -> None:
     """Refuse fewer rows than parameters."""
     if rows < parameters:
-        found = f"{rows} row{'s' if rows > 1 else ''} of data"
-        raise InputError(label, found, f"at least {parameters}, one for each parameter of the simulation")
+        found = f"{rows} row{'s' if rows != 1 else ''} of data"
+        raise InputError(label, found, _at_least(parameters))
+
+
+def check_strains(
+    source: TomlSource, declaration: Declaration, label: str, tensile: Tensile, parameters: int
+) -> None:
+    """Refuse fewer rows than parameters of a tensile test within the strains that are fitted."""
+    low, high = declaration.fit.tensile_strain or tensile.strain_range
+    rows, every = int(((tensile.strain >= low) & (tensile.strain <= high)).sum()), len(tensile.strain)
+    if declaration.fit.tensile_strain is None or every < parameters:
+        check_rows(label, rows, parameters)
+    elif rows < parameters:
+        found = f"{rows} of {every} rows between {low:g} and {high:g}"
+        runs = f"the strains run from {tensile.strain.min():.3g} to {tensile.strain.max():.3g}"
+        raise fault(source, ["fit", "tensile_strain"], found, f"{_at_least(parameters)}; {runs}")
+
+
+def _at_least(parameters: int) -> str:
+    return f"at least {parameters}, one for each parameter of the simulation"
 
 
 def _check_moduli(source: TomlSource, simulation: Simulation, tensile: bool) -> None:

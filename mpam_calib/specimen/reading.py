@@ -12,6 +12,7 @@ from mpam_calib.specimen.consistency import (
     check_levels,
     check_parts,
     check_rows,
+    check_strains,
     least_parameters,
     material_run,
     normalised_simulation,
@@ -62,9 +63,7 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
             free, rows["free_contraction"] = read_free_contraction(of("free_contraction"), geometry)
     if of("tensile"):
         tensile, rows["tensile"] = read_tensile(of("tensile"))
-        low, high = declaration.fit.tensile_strain or tensile.strain_range
-        in_range = int(np.count_nonzero((tensile.strain >= low) & (tensile.strain <= high)))
-        check_rows(of("tensile")[0].label, in_range, simulation.order + 1)
+        check_strains(source, declaration, of("tensile")[0].label, tensile, simulation.order + 1)
 
     levels_Pa, loops, force_map = _common_levels(loops, force_map, blocked, free)
     muscle_rows = sum(sum(counts) for kind, counts in rows.items() if kind != "tensile")
