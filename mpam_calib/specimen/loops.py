@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -34,6 +35,7 @@ from mpam_calib.specimen.plausibility import (
 from mpam_calib.specimen.recording import DEPRESSURISING, PRESSURISING, Bools, Floats, Ints, Loops
 from mpam_calib.specimen.reduction import average_rows, rows_per_mean
 from mpam_calib.specimen.source import DataFile
+from mpam_calib.specimen.summary import noise_within
 from mpam_calib.specimen.tables import GAPPED_COLUMNS
 from mpam_calib.specimen.wording import listed
 from mpam_calib.units import KPA, MM
@@ -50,18 +52,26 @@ class LoopsRead:
     by_setpoint: bool = False
 
 
+class _RowNoise(NamedTuple):
+    """Of a block: its rows, and the white noise (N) of one of them."""
+
+    rows: int
+    sd: float
+
+
 def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | None) -> LoopsRead:
     """Read the loops files in the order given and sort out levels, branches, cycles and strokes.
 
     Raises ``InputError`` for anything in a file that cannot be used.
     """
     wanted = rows_per_mean(sum(file.estimated_rows for file in files))
-    frames, clocks = [], []
+    frames, clocks, noises = [], [], []
     for file in files:
-        frame, read = _read_file(file, wanted, floor_N)
+        frame, read, noise = _read_file(file, wanted, floor_N)
         _check_plausible(file, frame, geometry)
         frames.append(frame)
         clocks.append(read)
+        noises += noise
     counts = [read.rows for read in clocks]
     # Turns, steps and gaps part the groups: where there are many, fewer rows make a mean.
     averaged = max(1, round(sum(counts) / sum(map(len, frames))))
@@ -129,6 +139,7 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
         began_s=began,
         censored=rows["censored"].to_numpy() > 0.5,
         averaged=averaged,
+        noise_N=_together(noises) if averaged > 1 else 0.0,
         unclear=unclear if unclear.any() else None,
         temperature_C=rows["temperature_C"].to_numpy() if "temperature_C" in everywhere else None,
     )
@@ -153,13 +164,19 @@ def one_after_the_other(times: Sequence[Floats]) -> tuple[Floats, Floats]:
     return np.concatenate(found), np.concatenate(began)
 
 
-def _read_file(file: DataFile, averaged: int, floor_N: float | None) -> tuple[pd.DataFrame, Clock]:
-    """The rows of a file (averaged where it is very large) with a ``censored`` column, and its clock."""
+def _read_file(
+    file: DataFile, averaged: int, floor_N: float | None
+) -> tuple[pd.DataFrame, Clock, list[_RowNoise]]:
+    """A file's rows (averaged where it is very large) with a ``censored`` column, its clock and its noise."""
     kept: list[pd.DataFrame] = []
+    noises: list[_RowNoise] = []
     clock = Clock(file)
     for block in clock.blocks():
         censored = censored_rows(block, floor_N)
         if averaged > 1:
+            # Noise that lasts for some rows stays in their mean: what one row has only the rows tell.
+            one = np.zeros(len(block), dtype=np.int64)
+            noises.append(_RowNoise(len(block), noise_within(block["force_N"].to_numpy(), one)))
             block, censored = average_rows(block, averaged, censored)
         kept.append(block.assign(censored=censored.astype(float)))
     frame = pd.concat(kept)
@@ -167,7 +184,13 @@ def _read_file(file: DataFile, averaged: int, floor_N: float | None) -> tuple[pd
         frame = frame.drop(columns="branch")  # empty all along: not given
     for name in GAPPED_COLUMNS.intersection(frame.columns):
         frame[name] = frame[name].interpolate(limit_direction="both")
-    return frame.dropna(axis="columns"), clock
+    return frame.dropna(axis="columns"), clock, noises
+
+
+def _together(noises: Sequence[_RowNoise]) -> float:
+    """The noise of all blocks, N, by their rows."""
+    told = np.array([noise for noise in noises if noise.sd >= 0.0])  # nan: too few rows to tell
+    return float(np.sqrt(np.average(told[:, 1] ** 2, weights=told[:, 0]))) if len(told) else 0.0
 
 
 def censored_rows(frame: pd.DataFrame, floor_N: float | None) -> Bools:

@@ -35,7 +35,8 @@ class Loops:
     ``stroke`` numbers the contiguous runs of one file, level, cycle and branch, from 0; ``clock``
     numbers the files, each of which may have its own clock: ``time_s`` goes on from file to file, and such
     a clock began at ``began_s`` on it.
-    ``averaged`` is how many consecutive rows of a very large file each entry stands for (1 otherwise).
+    ``averaged`` is how many consecutive rows of a very large file each entry stands for (1 otherwise), and
+    ``noise_N`` the white noise of one of those rows (0 otherwise).
     ``unclear`` rows, at turns, tell of the motion, but their force may belong to the other branch.
     ``temperature_C`` is there only where every loops file has the column.
     """
@@ -52,6 +53,7 @@ class Loops:
     censored: Bools
     began_s: Floats | float = 0.0
     averaged: int = 1
+    noise_N: float = 0.0
     unclear: Bools | None = None
     temperature_C: Floats | None = None
 

@@ -109,7 +109,9 @@ def sampling_rates(loops: Loops) -> tuple[float, ...]:
 
 
 def force_noise(loops: Loops) -> float:
-    """White noise of one force reading, N, by strokes."""
+    """White noise of one force reading, N, by strokes; of rows before any averaging where they are known."""
+    if loops.averaged > 1 and loops.noise_N > 0.0:
+        return loops.noise_N
     return noise_within(loops.force_N, loops.stroke) * math.sqrt(loops.averaged)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,8 @@ import pandas as pd
 import pytest
 
 from mpam_calib.errors import InputError
-from mpam_calib.specimen import read, reduction
-from mpam_calib.specimen.summary import summarise_loops
+from mpam_calib.specimen import blocks, read, reduction
+from mpam_calib.specimen.summary import force_noise, summarise_loops
 
 from .folders import DECLARATION, HEADER, Recording, loops, make
 
@@ -112,6 +113,25 @@ def test_averages_do_not_depend_on_where_the_blocks_end(
     monkeypatch.setattr("mpam_calib.specimen.blocks.BLOCK_BYTES", 40_000)
     specimen = read(make(tmp_path, loops=noisy().text()))
     assert specimen.loops is not None and specimen.loops.stroke[-1] + 1 == 12
+
+
+@pytest.mark.parametrize("size", [blocks.BLOCK_BYTES, 40_000])
+def test_the_noise_of_one_reading_is_what_it_was_before_averaging(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
+) -> None:
+    """A part of the noise lasts for five rows, and stays in their means."""
+    recorded, rng = noisy(), np.random.default_rng(3)
+    fast, slow = 0.2 * rng.standard_normal((2, len(recorded.time)))
+    kept = np.exp(-0.2 * np.arange(50))
+    noise = fast + np.convolve(slow, kept)[: len(slow)] * np.sqrt(1.0 - kept[1] ** 2)
+    folder = make(tmp_path, loops=replace(recorded, force=recorded.force + noise).text())
+    every = read(folder).loops
+    monkeypatch.setattr(reduction, "ROWS_KEPT", 3000)
+    monkeypatch.setattr(blocks, "BLOCK_BYTES", size)
+    means = read(folder).loops
+    assert every is not None and every.averaged == 1 and every.noise_N == 0.0
+    assert means is not None and means.averaged > 2
+    assert force_noise(means) == pytest.approx(force_noise(every), rel=0.05)
 
 
 def test_small_blocks_report_the_right_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
