@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
-from specimen.folders import loops
+from specimen.folders import DECLARATION, loops, make
 
 from mpam_calib.cli import main
 from mpam_calib.cli.app import ORDER
@@ -172,6 +172,15 @@ def test_output_that_nobody_reads_is_no_error(tmp_path: Path) -> None:
     )
     os.close(writer)
     assert "Traceback" not in result.stderr
+
+
+@pytest.mark.parametrize(("encoding", "said"), [("ascii", r"\u0420\u0435\u0437"), ("utf-8", "Рез")])
+def test_a_name_that_the_output_cannot_hold_is_escaped(encoding: str, said: str, tmp_path: Path) -> None:
+    text = DECLARATION.replace("Test muscle", "Рез")
+    folder = make(tmp_path / "new", text, loops=loops(rate=20.0).text())
+    result = run("check", str(folder), PYTHONIOENCODING=encoding)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert result.stdout.startswith(said)
 
 
 @pytest.mark.parametrize("closed", [">&-", ">&- 2>&-"])
