@@ -57,6 +57,11 @@ def refuse_missing(
     raise InputError(label, found, expected, row, missing[0])
 
 
+def means_how_many(spec: TableSpec, header: Sequence[str]) -> int:
+    """How many of a file's columns the header's names can mean."""
+    return sum(any(_means(name, cell) is not None for cell in header) for name in spec.columns)
+
+
 def _entry(name: str, cells: Sequence[str]) -> str:
     """A line of the map for a column, where one cell of the header alone can mean it; else nothing."""
     found = [(cell, factor) for cell in cells if (factor := _means(name, cell)) is not None]

@@ -11,9 +11,9 @@ from pathlib import Path
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import Column, Csv
 from mpam_calib.specimen.misread import refuse_thousands
-from mpam_calib.specimen.own_names import refuse_missing
+from mpam_calib.specimen.own_names import means_how_many, refuse_missing
 from mpam_calib.specimen.tables import TEXT_COLUMNS, TableSpec
-from mpam_calib.specimen.units_row import check_header_units, is_units_row
+from mpam_calib.specimen.units_row import are_units, check_header_units, is_units_row
 from mpam_calib.specimen.wording import listed, os_reason, quoted
 
 SAMPLE_BYTES = 1 << 17
@@ -82,7 +82,7 @@ def detect_format(
     if not any(line.strip() for line in lines):
         raise InputError(label, "an empty file", f"a header with {listed(spec.required)} and rows below it")
     wanted = {name: mapping[name].name or name if name in mapping else name for name in spec.columns}
-    row, delimiter = _header(lines, declared, set(wanted.values()))
+    row, delimiter = _header(lines, declared, spec, set(wanted.values()))
     header = _split(lines[row], delimiter)
     fields = _fields(label, row + 1, header, spec, mapping, wanted)
     check_header_units(label, row + 1, header, fields)
@@ -155,26 +155,48 @@ def _split(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in rows[0]] if rows else []
 
 
-def _header(lines: Sequence[str], declared: Csv, wanted: set[str]) -> tuple[int, str]:
-    """The row (from 0) and delimiter that find most of the wanted names; else the first row."""
+def _header(lines: Sequence[str], declared: Csv, spec: TableSpec, wanted: set[str]) -> tuple[int, str]:
+    """The row (from 0) and delimiter that find most of the wanted names; else what is most like a header."""
     delimiters = (declared.delimiter,) if declared.delimiter else _DELIMITERS
     first = declared.skip_rows or 0
     filled = [row for row, line in enumerate(lines) if line.strip()]
     rows = [row for row in filled if row >= first] or filled[-1:]
     lower = {name.lower() for name in wanted}
 
-    def merit(choice: tuple[int, str]) -> tuple[int, int, int]:
+    def merit(choice: tuple[int, str]) -> tuple[int, int, int, int]:
         cells = _split(lines[choice[0]], choice[1])
-        return len(lower.intersection(map(str.lower, cells))), -choice[0], len(cells)
+        found = len(lower.intersection(map(str.lower, cells)))
+        return found, 0 if found else means_how_many(spec, cells), -choice[0], len(cells)
 
     def best(rows: Sequence[int]) -> tuple[int, str]:
         return max(((row, delimiter) for row in rows for delimiter in delimiters), key=merit)
 
     if declared.skip_rows is None:
-        return best(rows[:HEADER_ROWS])
+        found = best(rows[:HEADER_ROWS])
+        if any(merit(found)[:2]):
+            return found
+        return _above_numbers(lines, rows[:HEADER_ROWS], delimiters) or found
     # Where the row holds none of the names, the declaration was meant for another file of the specimen.
     found, elsewhere = best(rows[:1]), best(filled[:HEADER_ROWS])
     return elsewhere if merit(found)[0] == 0 < merit(elsewhere)[0] else found
+
+
+def _above_numbers(
+    lines: Sequence[str], rows: Sequence[int], delimiters: Sequence[str]
+) -> tuple[int, str] | None:
+    """The last row of words that are no units above the first row of numbers, and the delimiter of both."""
+    for end, row in enumerate(rows):
+        for delimiter in delimiters:
+            if _all_numbers(_split(lines[row], delimiter)):
+                above = [each for each in rows[:end] if not are_units(_split(lines[each], delimiter))]
+                return (above[-1], delimiter) if above else None
+    return None
+
+
+def _all_numbers(cells: Sequence[str]) -> bool:
+    """Whether several cells, some perhaps empty, are numbers with either decimal mark."""
+    filled = [cell for cell in cells if cell]
+    return len(filled) > 1 and all(any(is_number(cell, mark) for mark in _MARK) for cell in filled)
 
 
 def _fields(

@@ -44,6 +44,12 @@ def is_units_row(label: str, row: int, cells: Sequence[str], fields: Sequence[Fi
     return True
 
 
+def are_units(cells: Sequence[str]) -> bool:
+    """Whether all cells of a row are units of anything, or empty."""
+    plain = [cell.strip().strip("[]()").lower() for cell in cells]
+    return all(any(unit in units for units in (_PLAIN, *_IN.values())) for unit in plain)
+
+
 def _is_unit(field: Field, unit: str) -> bool:
     """Whether a word is a unit of the column, or any at all where the map makes another quantity of it.
 

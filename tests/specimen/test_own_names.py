@@ -58,6 +58,39 @@ def test_all_that_is_missing_is_said_at_once(header: str, said: str, tmp_path: P
     assert said in message and "\n" not in message
 
 
+PREAMBLE = "Specimen label,7\nLoad cell,kN,50,\n\n"
+NONE = "s1,p1,x1,f1"
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "said"),
+    [
+        pytest.param(f"{PREAMBLE}Time,Pressure,Extension,Load", 4, 'time_s = "Time"', id="known words"),
+        pytest.param(
+            f"{PREAMBLE}Time,Pressure,Extension,Load\ns,kPa,mm,N", 4, "", id="known words and units"
+        ),
+        pytest.param(f"{PREAMBLE}{NONE}", 4, "", id="words above the numbers"),
+        pytest.param(f"{PREAMBLE}{NONE}\n(s),(kPa),(mm),(N)", 4, "", id="words above units"),
+        pytest.param(NONE, 1, "", id="no preamble"),
+        pytest.param("0.0,1.0,2.0,3.0", 1, "", id="no header"),
+    ],
+)
+def test_a_header_of_own_names_is_found_below_a_preamble(
+    header: str, row: int, said: str, tmp_path: Path
+) -> None:
+    message = refused(tmp_path, header)
+    names = header.splitlines()[row - 1].replace(",", '", "')
+    assert f'loops.csv:{row}:time_s: found the columns "{names}", expected' in message
+    assert said in message
+
+
+def test_a_preamble_that_names_a_column_hides_no_header(tmp_path: Path) -> None:
+    """Words that could mean columns count only where no row has a column's own name."""
+    made = loops().text()
+    found = read(make(tmp_path, loops="Time,Pressure,Displacement,Load\n" + made)).loops
+    assert found is not None and len(found.time_s) == len(made.splitlines()) - 1
+
+
 def test_the_map_that_is_offered_is_read(tmp_path: Path) -> None:
     header = "Time (s),Pressure (bar),Displacement,Load"
     offered = refused(tmp_path / "a", header).partition("[columns.loops] ")[2]
