@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.tables import TEXT_COLUMNS
-from mpam_calib.specimen.wording import quoted
+from mpam_calib.specimen.wording import listed, quoted
 
 if TYPE_CHECKING:
     from mpam_calib.specimen.text_format import Field
@@ -17,13 +17,17 @@ if TYPE_CHECKING:
 _PLAIN: Final = {"": 1.0, "-": 1.0, "mm/mm": 1.0, "m/m": 1.0, "%": 0.01}
 _IN: Final[dict[str, dict[str, float]]] = {
     "s": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0},
-    "kPa": {"kpa": 1.0, "pa": 1e-3, "hpa": 0.1, "mbar": 0.1, "mpa": 1e3, "bar": 100.0, "psi": 6.894757},
+    "kPa": {"kPa": 1.0, "Pa": 1e-3, "hPa": 0.1, "mbar": 0.1, "MPa": 1e3, "bar": 100.0, "psi": 6.894757},
     "mm": {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "cm": 10.0, "m": 1e3, "in": 25.4, "inch": 25.4},
-    "N": {"n": 1.0, "mn": 1e-3, "g": 9.80665e-3, "kg": 9.80665, "kgf": 9.80665, "lbf": 4.448222, "kn": 1e3},
-    "Pa": {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/mm²": 1e6, "n/mm2": 1e6, "n/mm^2": 1e6, "psi": 6894.757},
-    "C": {"°c": 1.0, "c": 1.0, "degc": 1.0},
+    "N": {"N": 1.0, "mN": 1e-3, "g": 9.80665e-3, "kg": 9.80665, "kgf": 9.80665, "lbf": 4.448222, "kN": 1e3},
+    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N/mm²": 1e6, "N/mm2": 1e6, "N/mm^2": 1e6, "psi": 6894.757},
+    "C": {"°C": 1.0, "C": 1.0, "degC": 1.0},
 }
-"""What one unit is worth in that of a column's name, by its spelling in lower case."""
+"""What one unit is worth in that of a column's name; how it is capitalised does not matter."""
+_IN_FULL: Final = {
+    "second": "s", "seconds": "s", "minutes": "min", "newton": "n", "newtons": "n",
+    "millimetres": "mm", "millimeters": "mm", "kilopascal": "kpa", "kilopascals": "kpa",
+}  # fmt: skip
 ALIKE = 0.05
 """A scale is a unit's within this share of it: it may hold a sensor's own gain, which is near one."""
 
@@ -33,12 +37,19 @@ _AT_THE_END: Final = re.compile(r".*(?:\[([^\[\]()]+)\]|\(([^\[\]()]+)\)|/([^/\[
 def is_units_row(label: str, row: int, cells: Sequence[str], fields: Sequence[Field]) -> bool:
     """Whether the ``cells`` of a row (counted from 1) are units of all columns that are read.
 
-    Raises ``InputError`` where they are, but the scale declared for one is another unit's.
+    Raises ``InputError`` where they are, but the scale declared for one is another unit's, and at a word
+    beside units that is none.
     """
     read = [field for field in fields if field.name not in TEXT_COLUMNS and field.position < len(cells)]
     written = {field: cells[field.position].strip().strip("[]()") for field in read}
-    if not any(written.values()) or not all(_is_unit(field, unit) for field, unit in written.items()):
+    known = {field for field, unit in written.items() if _is_unit(field, unit)}
+    if not any(written[field] for field in known):
         return False
+    for field, unit in written.items():
+        if field not in known:
+            if _is_number(unit):
+                return False
+            raise _unknown(label, row, field, cells[field.position].strip())
     for field, unit in written.items():
         _check_scale(label, row, field, unit)
     return True
@@ -46,8 +57,7 @@ def is_units_row(label: str, row: int, cells: Sequence[str], fields: Sequence[Fi
 
 def are_units(cells: Sequence[str]) -> bool:
     """Whether all cells of a row are units of anything, or empty."""
-    plain = [cell.strip().strip("[]()").lower() for cell in cells]
-    return all(any(unit in units for units in (_PLAIN, *_IN.values())) for unit in plain)
+    return all(_of_anything(cell.strip().strip("[]()")) for cell in cells)
 
 
 def _is_unit(field: Field, unit: str) -> bool:
@@ -55,10 +65,30 @@ def _is_unit(field: Field, unit: str) -> bool:
 
     Extension becomes strain by a scale that is no unit's, and its unit is a length's.
     """
-    if worth(field.name, unit) is not None:
-        return True
-    changed = not any(_alike(abs(field.scale), each) for each in _units(field.name).values())
-    return changed and any(unit.lower() in units for units in (_PLAIN, *_IN.values()))
+    return worth(field.name, unit) is not None or (_changed(field) and _of_anything(unit))
+
+
+def _changed(field: Field) -> bool:
+    return not any(_alike(abs(field.scale), each) for each in _units(field.name).values())
+
+
+def _of_anything(unit: str) -> bool:
+    return any(_worth(units, unit) is not None for units in (_PLAIN, *_IN.values()))
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _unknown(label: str, row: int, field: Field, cell: str) -> InputError:
+    expected = f"one of {listed(filter(None, _units(field.name)))}"
+    if _changed(field):
+        expected = "the unit of a time, a pressure, a length or a force"
+    return InputError(label, f"the unknown unit {quoted(cell)}", expected, row, field.name)
 
 
 def check_header_units(label: str, row: int, header: Sequence[str], fields: Sequence[Field]) -> None:
@@ -108,4 +138,9 @@ def _units(name: str) -> dict[str, float]:
 
 def worth(name: str, unit: str) -> float | None:
     """What a unit is worth in that of a column's name; None for a word that is none of its units."""
-    return 1.0 if not unit else _units(name).get(unit.lower())
+    return 1.0 if not unit else _worth(_units(name), unit)
+
+
+def _worth(units: dict[str, float], unit: str) -> float | None:
+    plain = _IN_FULL.get(unit.lower(), unit.lower())
+    return next((factor for each, factor in units.items() if each.lower() == plain), None)

@@ -99,8 +99,38 @@ def test_units_of_what_a_map_makes_another_quantity_of(tmp_path: Path, units: st
         found = read(made).tensile
         assert found is not None and found.strain.max() == pytest.approx(0.04 * 29.5)
     else:
-        with pytest.raises(InputError, match=r"tensile.csv:2:strain: found \"furlong\", expected a number"):
+        said = (
+            r'tensile.csv:2:strain: found the unknown unit "furlong", expected the unit of a time, a pressure'
+        )
+        with pytest.raises(InputError, match=said):
             read(made)
+
+
+@pytest.mark.parametrize(
+    ("units", "said"),
+    [
+        pytest.param(
+            "s,kPa,mm,kip",
+            'loops.csv:2:force_N: found the unknown unit "kip", expected one of "N", "mN", "g", "kg"',
+            id="one",
+        ),
+        pytest.param("s,(bar(g)),mm,N", '2:pressure_kPa: found the unknown unit "(bar(g))"', id="brackets"),
+        pytest.param(",,,kip", "2:time_s: found an empty cell, expected a number", id="alone"),
+        pytest.param("0.0,kPa,mm,N", '2:pressure_kPa: found "kPa", expected a number', id="beside a number"),
+        pytest.param("a,b,c,d", '2:time_s: found "a", expected a number', id="words"),
+        pytest.param("seconds,Kilopascal,millimetres,Newtons", "", id="in full"),
+        pytest.param("s,,mm,N", "", id="one empty"),
+    ],
+)
+def test_an_unknown_unit_is_refused_where_it_is(units: str, said: str, tmp_path: Path) -> None:
+    header, body = loops().text().split("\n", 1)
+    made = make(tmp_path, loops=f"{header}\n{units}\n{body}")
+    if not said:
+        assert read(made).levels_Pa == pytest.approx([5e4, 1e5, 1.5e5])
+        return
+    with pytest.raises(InputError) as caught:
+        read(made)
+    assert said in str(caught.value)
 
 
 @pytest.mark.parametrize(
