@@ -39,6 +39,8 @@ SLOW_HZ, FAST = 0.05, 0.2
 """Readings rarer than this, and crossheads faster (m/s), are no tensile tester's."""
 STIFFNESS_PA = 100.0, 1e11
 """Between these are the declared moduli of everything that a bladder is made of, and far beyond."""
+STRAND_GPA = 0.01, 1e3
+"""Between these are the moduli of all threads and wires, from elastic cord to carbon."""
 STRETCHED = 0.01
 """A bladder that is longer than at rest by more than this share pulls by itself."""
 LITTLE_FURTHER = 0.01
@@ -348,13 +350,15 @@ def _braid_limit(geometry: Geometry, kinematics: str) -> float:
 
 
 def _odd_stiffness(specimen: Specimen) -> list[str]:
-    """Moduli that no bladder has."""
-    stiffness: dict[str, float] = {}
-    if specimen.simulation.E_Pa is not None:
-        stiffness["E_Pa: a modulus of"] = max(map(abs, specimen.simulation.E_Pa))
-    low, high = STIFFNESS_PA
+    """Moduli that no bladder and no strand has."""
+    moduli, braid = specimen.simulation.E_Pa, specimen.braid
+    declared = []
+    if moduli is not None:
+        declared.append(("E_Pa", max(map(abs, moduli)), STIFFNESS_PA, "Pa", "pascals"))
+    if braid is not None:
+        declared.append(("E_br_GPa", braid.E_br_GPa, STRAND_GPA, "GPa", "gigapascals"))
     return [
-        f"{what} {value:.2g} Pa; is it in pascals?"
-        for what, value in stiffness.items()
+        f"{key}: a modulus of {value:.2g} {unit}; is it in {word}?"
+        for key, value, (low, high), unit, word in declared
         if not low <= value <= high
     ]

@@ -152,6 +152,15 @@ def test_a_tensile_test_in_megapascals(scale: float, odd: bool, tmp_path: Path) 
     assert ("is it in pascals?" in " ".join(oddities(read(folder)))) == odd
 
 
+@pytest.mark.parametrize(("modulus", "odd"), [(2.1, False), (230.0, False), (2.1e9, True), (2.1e-3, True)])
+def test_strands_that_no_braid_has(modulus: float, odd: bool, tmp_path: Path) -> None:
+    braid = f"[braid]\nE_br_GPa = {modulus}\nnu_s = 0.3\nR_br_mm = 0.1\nn = 48\n[files]"
+    text = DECLARATION.replace("[files]", braid)
+    found = " ".join(oddities(read(make(tmp_path, text, loops=loops().text()))))
+    assert (f"E_br_GPa: a modulus of {modulus:.2g} GPa; is it in gigapascals?" in found) == odd
+    assert ("E_br_GPa" in found) == odd
+
+
 @pytest.mark.parametrize(
     ("friction", "by_pressure", "said"),
     [("none", "true", True), ("none", "false", False), ("coulomb", "true", False)],
