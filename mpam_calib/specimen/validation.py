@@ -74,6 +74,8 @@ def _in_our_words(source: TomlSource, error: ErrorDetails) -> InputError:
         return fault(source, keys, f"a list of {len(value)}", "two numbers, from and to")
     if kind == "missing":
         return _missing(source, keys)
+    if table == ["files"] and value == []:  # of the two that may stand there, the error tells of a name alone
+        return fault(source, keys, "an empty list", "at least one file's name")
     found = shown(value)
     if kind == "literal_error":
         words = re.findall(r"'([^']*)'", str(context["expected"]))

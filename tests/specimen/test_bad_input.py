@@ -312,6 +312,10 @@ CASES: dict[str, tuple[Spoil, list[str]]] = {
         ["no table [geometry]"],
     ),
     "no files": (toml('loops = "loops.csv"', ""), ["no data files"]),
+    "a list of no files": (
+        toml('"loops.csv"', "[]"),
+        ["specimen.toml:11:files.loops: found an empty list, expected at least one file's name"],
+    ),
     "tensile moduli without a source": (
         append('moduli = "tensile"\n'),
         ["without E_Pa and without a tensile file"],
