@@ -74,6 +74,12 @@ def test_an_option_of_simulate_that_means_nothing(
     assert str(error.value).startswith(said)
 
 
+def test_an_effect_hidden_in_two_forms_is_hidden_twice() -> None:
+    muscle = mc.read(ROOT / "datasets" / "mpam1_reconstructed")
+    with pytest.raises(mc.InputError, match="--hide: found creep twice, expected each effect once"):
+        mc.simulate(muscle, {"creep": 0.01, "creep:power": None})
+
+
 @pytest.mark.parametrize("given", [None, 5, b"x", ["x"], "a\0b"])
 def test_what_is_no_path(given: Any) -> None:
     with pytest.raises(mc.InputError, match=r"SPECIMEN: found .*, expected the path of a specimen's folder"):

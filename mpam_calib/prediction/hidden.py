@@ -58,6 +58,8 @@ def with_hidden(
         item = effect(declared)
         if item.needs_braid and specimen.braid is None:
             raise InputError(PLACE, f"{identifier} without [braid]", "the strands' values in specimen.toml")
+        if any(identifier == other.partition(":")[0] for other in hidden):
+            raise InputError(PLACE, f"{identifier} twice", "each effect once")
         simulation = blueprint.simulation
         if identifier in simulation.effect_ids or identifier in simulation.effects_within:
             raise InputError(PLACE, f'"{identifier}"', "an effect that the simulation does not have")
