@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import re
 import subprocess
@@ -69,6 +70,15 @@ def howto_module() -> str:
     text = (ROOT / "docs" / "add_an_effect.md").read_text(encoding="utf-8")
     blocks: list[str] = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     return blocks[0]
+
+
+def test_the_how_to_names_the_priors_arguments_as_they_are() -> None:
+    text = (ROOT / "docs" / "add_an_effect.md").read_text(encoding="utf-8")
+    written = re.findall(r"`([A-Z]\w+)\(([a-z_, ]+)\)`", text)
+    assert {"Normal", "LogNormal", "Uniform"} <= {name for name, _ in written}
+    for name, arguments in written:
+        found = inspect.signature(getattr(mpam_calib, name)).parameters.values()
+        assert arguments.split(", ") == [one.name for one in found if one.default is one.empty], name
 
 
 def test_an_installed_package_brings_its_effect_to_the_command_line(tmp_path: Path) -> None:

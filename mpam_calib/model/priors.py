@@ -57,7 +57,7 @@ def _demand_order(prior: str, low: float, high: float) -> None:
 
 @dataclass(frozen=True)
 class Normal:
-    """N(mean, sd²)."""
+    """N(mean, scale²)."""
 
     mean: float
     scale: float
