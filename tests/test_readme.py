@@ -11,7 +11,8 @@ import typer.core
 
 from mpam_calib.cli.app import app
 from mpam_calib.model.effect import effect, known_effects
-from mpam_calib.specimen.declaration import Declaration
+from mpam_calib.specimen.declaration import Declaration, FileKind
+from mpam_calib.specimen.tables import TABLES
 from mpam_calib.specimen.toml_source import read_toml
 from mpam_calib.specimen.validation import validate
 
@@ -42,6 +43,13 @@ def test_its_specimen_is_a_valid_one(tmp_path: Path) -> None:
     declaration = validate(read_toml(tmp_path))
     assert isinstance(declaration, Declaration)
     assert declaration.simulation.effects == ("dead_band",)
+
+
+@pytest.mark.parametrize("kind", TABLES)
+def test_it_lists_the_columns_that_are_read(kind: FileKind) -> None:
+    (row,) = re.findall(rf"^\| {kind} \| (.*) \|$", README, flags=re.MULTILINE)
+    listed = {name for part in re.findall(r"`([\w, ]+)`", row) for name in part.split(", ")}
+    assert listed == {*TABLES[kind].columns, *TABLES[kind].unread}
 
 
 def test_it_lists_the_commands_that_there_are() -> None:
