@@ -35,7 +35,8 @@ def calibrate(
     Writes a report, the parameters, bands on what the muscle does and the draws behind them to RUN.
 
     The same command on an unfinished RUN resumes it and keeps a finished one; other data, another
-    model or seed replaces it. Exit code 3: not converged within the budget; a larger one resumes.
+    model, seed or options replace it. Exit code 3: not converged within the budget; a larger one
+    resumes.
     """
     from mpam_calib.cli.progress import sampling_progress
     from mpam_calib.model.blueprint import Options

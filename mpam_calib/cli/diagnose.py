@@ -21,6 +21,8 @@ def diagnose(
 ) -> None:
     """Show what the declared simulation gets wrong, name the cause, extend the model, measure the gain.
 
+    Writes diagnosis.json, report.html and the extended model's extended/specimen.toml to RUN.
+
     The same command goes on where it was interrupted, and keeps what is finished.
     """
     from mpam_calib.cli.progress import stage_progress

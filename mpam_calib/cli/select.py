@@ -21,6 +21,8 @@ def select(
 ) -> None:
     """Rank orders, laws, frictions, kinematics and strain conventions by evidence and held-out levels.
 
+    Writes models.csv, prior_sensitivity.csv and report.html to RUN.
+
     The same command goes on where it was interrupted, and keeps what is finished.
     """
     import pandas as pd

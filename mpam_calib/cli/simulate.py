@@ -31,7 +31,11 @@ def simulate(
     ] = None,
     seed: Annotated[int, typer.Option(help="seed of the noise", min=0)] = 0,
 ) -> None:
-    """Write a specimen folder with synthetic recordings of the declared simulation."""
+    """Write a specimen folder with synthetic recordings of the declared simulation.
+
+    Writes specimen.toml, loops_synthetic.csv or force_map_synthetic.csv, and truth.json (what was hidden) to
+    DIR; with a tensile test, tensile.csv.
+    """
     from mpam_calib.prediction.simulate import simulate as make
     from mpam_calib.run.synthetic import demand_synthetic_folder, write_specimen
     from mpam_calib.specimen import read

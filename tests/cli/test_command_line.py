@@ -19,7 +19,11 @@ from mpam_calib.cli import main
 from mpam_calib.cli.app import ORDER
 from mpam_calib.cli.progress import sampling_progress
 from mpam_calib.posterior.chains.sampling import Progress
+from mpam_calib.run import diagnose as diagnosed
+from mpam_calib.run import select as selected
+from mpam_calib.run import synthetic
 from mpam_calib.run.predict import parse_pressures
+from mpam_calib.specimen.toml_source import SPECIMEN_FILE
 
 COMMAND = [sys.executable, "-m", "mpam_calib"]
 
@@ -51,6 +55,24 @@ def test_each_option_is_explained_within_a_window_of_80_columns(command: str) ->
     options = text.partition("Options:")[2]
     for entry in re.split(r"\n  (?=-)", options.strip("\n")):
         assert re.search(r" {2,}[A-Z][a-z]+", entry), entry
+
+
+@pytest.mark.parametrize(
+    ("command", "files"),
+    [
+        ("select", selected.FILES),
+        ("diagnose", diagnosed.FILES),
+        ("simulate", (SPECIMEN_FILE, synthetic.LOOPS, synthetic.FORCE_MAP, synthetic.TRUTH)),
+    ],
+)
+def test_help_names_the_files_that_are_written(command: str, files: tuple[str, ...]) -> None:
+    words = run(command, "--help").stdout.replace(",", " ").split()
+    assert set(files) <= set(words)
+
+
+def test_help_says_what_replaces_a_run() -> None:
+    text = " ".join(run("calibrate", "--help").stdout.split())
+    assert "other data, another model, seed or options replace it" in text
 
 
 def test_help_of_pressure_says_what_is_meant() -> None:
