@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 from model import build
 from scipy import stats
 
@@ -13,7 +14,8 @@ from mpam_calib.calibration import calibrate
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.density.collapsed import Collapsed
-from mpam_calib.posterior.density.target import build_target, predict_force
+from mpam_calib.posterior.density.free_ends import Short
+from mpam_calib.posterior.density.target import build_target, locate, predict_force
 from mpam_calib.specimen.recording import BlockedForce, ForceMap, FreeContraction, Specimen
 
 Array = np.ndarray
@@ -180,6 +182,19 @@ def test_where_a_force_along_the_stroke_or_one_modulus_tells_the_slope_moduli_ar
         assert not plain_target(other).model.coordinates_sampled
     assert len(plain_target(made).model.coordinates_sampled) == 2
     assert len(plain_target(ends(np.full(4, 0.2), law="linear")).model.coordinates_sampled) == 4
+
+
+def test_where_no_curve_can_be_none_is_excluded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The model stays what it is, so that a run can be resumed and predicted from."""
+    monkeypatch.setattr(Short, "gone", lambda short, force, sd: np.ones(len(force), dtype=bool))
+    made = recorded()
+    assert not np.isfinite(plain_target(made).log_posterior(np.zeros((1, 4)))).any()
+    target, modes = locate(plain_target(made), np.random.default_rng(0))
+    assert target.guide.contradicted and target.model.names == plain_target(made).model.names
+    assert len(modes[0].u) == len(target.model.names) and np.isfinite(modes[0].log_posterior)
+    # Nor is one that rises there.
+    u = vectors(target, np.array([[-30.0, 0.0], [30.0, 0.0]]))
+    assert np.isfinite(target.log_posterior(u)).all()
 
 
 def test_no_coordinate_is_reported() -> None:

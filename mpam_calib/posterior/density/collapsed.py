@@ -345,8 +345,10 @@ class Collapsed:
         terms = self.model.chain.terms(values, points.readings, self.guide.points, self.guide.point_echo)
         fixed, columns = terms.fixed, terms.columns
         moduli = self.model.moduli_of(values)
-        ends = self._free_ends.at(values, moduli) if self._free_ends and moduli is not None else None
+        ends = None
         if moduli is not None:
+            if self._free_ends is not None:
+                ends = self._free_ends.at(values, moduli, self.guide.contradicted)
             fixed, columns = fixed + np.einsum("bnp,bp->bn", columns, moduli), np.zeros_like(columns)
         design = self._design(values, columns, self._point_remainder)
         B = len(design)

@@ -91,8 +91,11 @@ class FreeEnds:
             return None
         return FreeEnds(model, free.readings, ~free.censored, Short.of(points, model, COARSE * STEP))
 
-    def at(self, values: Mapping[str, Array], moduli: Array) -> Ends:
-        """For values (B, 1) and the moduli's coordinates (B, p); the remainder's own slope is left out."""
+    def at(self, values: Mapping[str, Array], moduli: Array, contradicted: bool = False) -> Ends:
+        """For values (B, 1) and the moduli's coordinates (B, p); the remainder's own slope is left out.
+
+        Where the simulation contradicts all that was measured, no curve is excluded.
+        """
         model, n = self.model, len(self.rows)
         assert model.chain is not None and model.setting is not None
         L0 = model.setting.geometry.L0
@@ -103,10 +106,11 @@ class FreeEnds:
         curves = [] if self.short is None else [self.short.readings]
         force = model.chain.force(values, moduli, Readings.join([*sides, *curves]))
         slope = (force[:, 2 * n : 3 * n] - force[:, :n]) / (2.0 * SLOPE_STEP * L0)
-        falls = np.maximum(-slope[:, self.seen], 0.0)
+        falls = -slope[:, self.seen]
+        falls = np.abs(falls) if contradicted else np.maximum(falls, 0.0)
         with np.errstate(divide="ignore"):
             weight = np.log(L0 * falls).sum(axis=1)
-        if self.short is not None:
+        if self.short is not None and not contradicted:
             gone = self.short.gone(force[:, 3 * n :], values[CONTRACTION_SD])
             weight = np.where(gone, -np.inf, weight)
         return Ends(force[:, n : 2 * n], slope, weight)

@@ -22,7 +22,8 @@ class Guide:
     ``nodes`` (N) is that at the bins' nodes, where white noise alone asks for a force that depends on itself.
     ``bin_echo``, ``node_echo`` and ``point_echo`` are how many times such a force feels a change there
     (:meth:`~mpam_calib.model.chain.Chain.echo`), None where nothing depends on it. ``bin_noise`` and
-    ``point_noise`` (N) are where the sites of Student-t noise are settled.
+    ``point_noise`` (N) are where the sites of Student-t noise are settled. ``contradicted``: no curve falls
+    to its free contraction as its first root, and such curves are not excluded.
     """
 
     bins: Array | None = None
@@ -34,6 +35,7 @@ class Guide:
     bin_echo: Array | None = None
     node_echo: Array | None = None
     point_echo: Array | None = None
+    contradicted: bool = False
 
     @staticmethod
     def measured(bins: LoopBins | None) -> Guide:

@@ -110,8 +110,8 @@ def locate(target: Collapsed, rng: np.random.Generator) -> tuple[Collapsed, list
 def _with_moduli(target: Collapsed, rng: np.random.Generator) -> tuple[Collapsed, list[Mode]]:
     """The same where the moduli are sampled: climbs start from draws of a target that integrates them out.
 
-    There every curve falls as steeply as a straight line from the blocked force. Where no draw can be, the
-    simulation contradicts the free contractions, and that target stands in.
+    There every curve falls as steeply as a straight line from the blocked force. If none of them can be, the
+    simulation contradicts the free contractions, and none is excluded.
     """
     model, points = target.model, target.data.points
     assert model.setting is not None and points is not None
@@ -128,7 +128,8 @@ def _with_moduli(target: Collapsed, rng: np.random.Generator) -> tuple[Collapsed
     u = np.concatenate([u, eta[:, : model.linear_sizes[0]]], axis=1)
     height = evaluate(target, u)
     if not np.isfinite(height).any():
-        return _settle(twin, modes)
+        target = replace(target, guide=replace(target.guide, contradicted=True))
+        height = evaluate(target, u)
     best = u[np.argsort(-height)[:CLIMBED]]
     return _settle(target, climb_modes(target, list(best)))
 
@@ -179,7 +180,10 @@ def _guide(target: Collapsed, u: Array) -> Guide:
     if data.bins is not None and bin_echo is not None and target.white_only:
         nodes, node_echo = estimate(data.bins.nodes.readings)
     heavy = _heavy_noise(target, values)
-    loops = Guide(bins, bin_noise=heavy[0], nodes=nodes, bin_echo=bin_echo, node_echo=node_echo)
+    loops = Guide(
+        bins, bin_noise=heavy[0], nodes=nodes, bin_echo=bin_echo, node_echo=node_echo,
+        contradicted=target.guide.contradicted,
+    )  # fmt: skip
     if data.points is None or model.setting is None:
         return loops
     rows = data.points.readings
