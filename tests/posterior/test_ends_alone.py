@@ -127,7 +127,7 @@ def test_draws_are_those_of_a_posterior_by_quadrature() -> None:
     drawn = calibrate(made, options=build.PLAIN, seed=3)
     target = drawn.target
     assert drawn.converged and len(target.model.coordinates_sampled) == 2
-    half = np.tile(0.5 * read[:, None], (1, 1))
+    half = 0.5 * read[:, None]
     sampled = curves(target, drawn.draws.eta[:, :2], half)[:, :, 0]
 
     low, high = (np.quantile(drawn.draws.eta[:, :2], q, axis=0) for q in (0.0005, 0.9995))

@@ -79,3 +79,25 @@ def test_order_four_of_a_measurement_is_that_of_its_order_five() -> None:
     own, found = squared_correlation(F, measured), squared_correlation(fitted, measured)
     assert orders.least_correlation(own, squared_correlation(fitted, F)) <= found
     assert own < 0.999 and abs(found - own) < 5e-4
+
+
+def test_higher_orders_seldom_lose_as_much_as_is_printed() -> None:
+    """Relative least squares of a disturbed curve, the disturbances as large as the printed R² says."""
+    gamma, F = orders.curve("MPAM2", 0.24)
+    G = decoded.gas_and_thickness(decoded.LEVELS[3], gamma)
+    five, six = (decoded.columns(gamma, order) for order in (5, 6))
+    rng = np.random.default_rng(5)
+    lost = []
+    for _ in range(300):
+        waves = rng.normal(size=8)[:, None] * np.sin(
+            rng.uniform(5.0, 120.0, 8)[:, None] * gamma + rng.uniform(0.0, 6.3, 8)[:, None]
+        )
+        size = np.sqrt(rng.uniform(0.002, 0.01)) * F.std() / waves.sum(axis=0).std()
+        measured = F + size * waves.sum(axis=0)
+        lower, higher = (
+            squared_correlation(G + X @ least_squares(X, measured - G, 1.0 / F), measured)
+            for X in (five, six)
+        )
+        lost.append(lower - higher)
+    assert max(lost) > 0.0  # a fall is no proof
+    assert max(lost) <= entries.LIKELY_FALL
