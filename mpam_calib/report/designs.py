@@ -345,19 +345,17 @@ def _bands(view: DesignsView) -> Section:
         "What the bands hold",
         [
             Text(
-                f"Every draw of the posterior goes through the model itself, with its effects "
-                f"({', '.join(carried) or 'none declared'}){gauge}, at the new geometry. "
-                "Moduli in engineering strain do not act on the blocked force, in stretch they do. "
-                "Manufacturing: "
+                "Every draw of the posterior goes through the model itself, with its effects "
+                f"({', '.join(carried) or 'none declared'}){gauge}, at the new geometry. Moduli in "
+                "engineering strain do not act on the blocked force, in stretch they do. Manufacturing: "
                 f"every draw is built with its own deviation from the drawing, of the declared sd ({told}); "
-                "what the run found about the tested muscle's own geometry stays with that muscle"
-                f"{of_test}. The "
-                "remainder (what the physics left unexplained) is carried as the same share of the ideal gas "
-                "force at rest length. Left out: the sensor's noise, a single stroke's own remainder, and "
-                "friction, for the force is the mean of both branches.\n\n"
+                f"what the run found about the tested muscle's own geometry stays with that muscle{of_test}. "
+                "The remainder (what the physics left unexplained) is carried as the same share of the ideal "
+                "gas force at rest length. Left out: the sensor's noise, a single stroke's own remainder, "
+                "and friction, for the force is the mean of both branches.\n\n"
                 f"Case I subtracts the energy in the strands (Eq. 2.25, {strands}; E_br = {stiff}). Case II "
-                "leaves the strands as they are declared. Length at rest stays "
-                f"{blueprint.geometry.L0_mm:g} mm.\n\n"
+                f"leaves the strands as they are declared. Length at rest stays {blueprint.geometry.L0_mm:g} "
+                "mm.\n\n"
                 f"The searches (differential evolution, then SQP) use {view.draws[0]} draws, their last "
                 f"refinement and the bands {view.draws[1]}."
             ),

@@ -306,13 +306,12 @@ def _gain(content: dict[str, Any]) -> list[Block]:
         )
     ]
     text = (
-        f"Whole {gain['held_out']} groups were held out, {gain['folds']} folds, with search and fit "
-        f"repeated in each (after); "
-        f"{gain['folds_same_set']} of them chose the same causes. The held-out readings are "
+        f"Whole {gain['held_out']} groups were held out, {gain['folds']} folds, with search and fit repeated "
+        f"in each (after); {gain['folds_same_set']} of them chose the same causes. The held-out readings are "
         f"{gain['elpd_gain']:.4g} ± {gain['elpd_gain_se']:.3g} nats more probable with the extended model "
-        "(each nat is a factor of 2.7). "
-        "With fewer data a fold may recognise other causes: the last column keeps those named above, "
-        f"fitted anew in every fold ({gain['elpd_gain_named']:.4g} ± {gain['elpd_gain_named_se']:.3g} nats)."
+        "(each nat is a factor of 2.7). With fewer data a fold may recognise other causes: the last column "
+        f"keeps those named above, fitted anew in every fold ({gain['elpd_gain_named']:.4g} ± "
+        f"{gain['elpd_gain_named_se']:.3g} nats)."
     )
     table = pd.DataFrame(rows)
     return [

@@ -228,9 +228,8 @@ def _confusion_section(found: Selection, names: list[str], what: str) -> Section
         "Would data like these tell them apart?",
         [
             Text(
-                f"Each row: {found.replicates} sets of readings ({what}) simulated from that model with "
-                "this specimen's design and noise; the columns say how often each model was then ranked "
-                "first."
+                f"Each row: {found.replicates} sets of readings ({what}) simulated from that model with this "
+                "specimen's design and noise; the columns say how often each model was then ranked first."
             ),
             DataTable(
                 confusion,

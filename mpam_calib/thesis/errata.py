@@ -60,23 +60,18 @@ def _readings() -> list[Erratum]:
             "Eq. 2.13-2.17, 4.5, 4.6, 4.10-4.12, 4.18",
             "Strains L/L0 − 1, R/R0 − 1 in the stress polynomials",
             "Stretches L/L0, R/R0; R from Eq. 4.16, α from Eq. 4.15, in the form of Eq. 4.6",
-            f"With Table 4.3 at 200 kPa strains give {strain[0]:.0f} N at γ = 0.1 and {strain[1]:.0f} N "
-            "at 0.3. Stretches "
-            f"give curves that fall to 0 at {root:.1f} % (250 kPa; Table 4.12: 33.2 %). Refitted for M = "
-            "1, 2, 3, "
-            f"R² is {_three(kinds['stretch'])} with stretches and {_three(kinds['engineering'])} with "
-            "strains; "
-            "Table 4.2 has 0.8784, 0.8771, 0.9780.",
+            f"With Table 4.3 at 200 kPa strains give {strain[0]:.0f} N at γ = 0.1 and {strain[1]:.0f} N at "
+            f"0.3. Stretches give curves that fall to 0 at {root:.1f} % (250 kPa; Table 4.12: 33.2 %). "
+            f"Refitted for M = 1, 2, 3, R² is {_three(kinds['stretch'])} with stretches and "
+            f"{_three(kinds['engineering'])} with strains; Table 4.2 has 0.8784, 0.8771, 0.9780.",
         ),
         Erratum(
             "Table 4.9 (Eq. 4.8)",
             "Constants of each modulus, validated by R² of 0.986 to 0.9997",
             "Not used for the force; laws are fitted to the force of all levels jointly",
             f"The R² reproduce, and the law gives {', '.join(f'{f:.0f}' for f in lost)} N at γ = 0 where "
-            "Table 4.7 "
-            f"decodes to {', '.join(f'{f:.0f}' for f in true)} N: moduli that add up to "
-            f"{np.abs(E2).sum():.1e} Pa "
-            f"in size at 250 kPa cancel to {abs(E2.sum()):.1e} Pa.",
+            f"Table 4.7 decodes to {', '.join(f'{f:.0f}' for f in true)} N: moduli that add up to "
+            f"{np.abs(E2).sum():.1e} Pa in size at 250 kPa cancel to {abs(E2.sum()):.1e} Pa.",
         ),
         Erratum(
             "Tables 4.2, 4.6, 4.11",
@@ -89,9 +84,8 @@ def _readings() -> list[Erratum]:
             "Eq. 4.5, 4.17",
             "Relative least squares",
             "Absolute least squares in the package; the relative kind only to repeat the thesis",
-            "Residuals are divided by a force that goes to 0 at free contraction, so that the blocked "
-            "force counts "
-            "least; it is also why f_s comes out at the lower bound of its range (Fig. 4.20).",
+            "Residuals are divided by a force that goes to 0 at free contraction, so that the blocked force "
+            "counts least; it is also why f_s comes out at the lower bound of its range (Fig. 4.20).",
         ),
     ]
 
@@ -182,22 +176,20 @@ def _equations() -> list[Erratum]:
             "Text 4.6.1.2",
             "MPAM2 requires a fifth-degree polynomial",
             "Order 4 does as well",
-            f"Fitted jointly, linear in P, order 4 leaves "
-            f"{laws.joint('MPAM2', 4, laws.linear_basis(), '').rmse_N:.2f} N and "
-            f"order 5 {laws.joint('MPAM2', 5, laws.linear_basis(), '').rmse_N:.2f} N; at 200 kPa order 4 "
-            "matches the decoded "
-            f"fifth-order curve to {_order_four():.2f} N rms.",
+            "Fitted jointly, linear in P, order 4 leaves "
+            f"{laws.joint('MPAM2', 4, laws.linear_basis(), '').rmse_N:.2f} N and order 5 "
+            f"{laws.joint('MPAM2', 5, laws.linear_basis(), '').rmse_N:.2f} N; at 200 kPa order 4 matches the "
+            f"decoded fifth-order curve to {_order_four():.2f} N rms.",
         ),
         Erratum(
             "Fig. 4.19, Eq. 4.8",
             "Moduli that saturate above 100 kPa, explained by cross-linking",
             "One outlying level",
             f"The moduli at 50 kPa are {smaller.min():.0f} to {smaller.max():,.0f} times smaller than the "
-            "others and the curve there falls to "
-            f"{_fall(0):.2f} of its blocked force at γ = 0.05 (the others to "
-            f"{_fall(1):.2f}-{_fall(4):.2f}). Four constants "
-            "describe five points, and for k <= 4 w exp(zP) matters at that one alone (of E_5 it is still "
-            f"{100 * _second_part():.0f} % at 100 kPa). Without that level a linear law of order 4 leaves "
+            f"others and the curve there falls to {_fall(0):.2f} of its blocked force at γ = 0.05 (the "
+            f"others to {_fall(1):.2f}-{_fall(4):.2f}). Four constants describe five points, and for k <= 4 "
+            f"w exp(zP) matters at that one alone (of E_5 it is still {100 * _second_part():.0f} % at 100 "
+            "kPa). Without that level a linear law of order 4 leaves "
             f"{laws.joint('MPAM2', 4, laws.linear_basis(), '', slice(1, None)).rmse_N:.2f} N.",
         ),
     ]

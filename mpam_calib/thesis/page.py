@@ -42,8 +42,7 @@ def page(result: Reproduction, bands: dict[str, MuscleBands] | None = None) -> P
             compared(bands),
         ],
         footer="S. Zabihollah, Modelling, Design Optimization, and Experimental Characterization of "
-        "Miniaturized "
-        "Pneumatic Artificial Muscles (thesis).",
+        "Miniaturized Pneumatic Artificial Muscles (thesis).",
     )
 
 
@@ -52,10 +51,8 @@ def _lead(ledger: Ledger) -> list[Block]:
     return [
         Headline(
             f"Of {n[REPRODUCED] + n[MISPRINT] + n[NOT_REPRODUCIBLE]} printed numbers {n[REPRODUCED]} are "
-            "reproduced, "
-            f"{n[MISPRINT]} contradict the thesis's own equations or tables, and {n[NOT_REPRODUCIBLE]} "
-            "cannot be "
-            "recomputed, nearly all because the measurements are lost."
+            f"reproduced, {n[MISPRINT]} contradict the thesis's own equations or tables, and "
+            f"{n[NOT_REPRODUCIBLE]} cannot be recomputed, nearly all because the measurements are lost."
         ),
         Numbers(
             [
@@ -109,9 +106,8 @@ def _optimiser(chapter: Chapter3) -> Section:
         [
             Text(
                 f"{starts.runs} searches of Case II from random populations, their evolutionary stage cut "
-                "short "
-                f"at {SHORT} generations ({starts.lowest_global:.1f} to {starts.highest_global:.1f} N, as "
-                f"scattered as Table 3.3): SQP then reached {best_force(200):.5f} N to 1e-5 N in "
+                f"short at {SHORT} generations ({starts.lowest_global:.1f} to {starts.highest_global:.1f} N, "
+                f"as scattered as Table 3.3): SQP then reached {best_force(200):.5f} N to 1e-5 N in "
                 f"{starts.reached_sqp} of them, interior point in {starts.reached_ip}, with "
                 f"{starts.evaluations_mean:.0f} evaluations on average for all three stages, those for "
                 "gradients included."
@@ -119,8 +115,7 @@ def _optimiser(chapter: Chapter3) -> Section:
             DataTable(
                 active,
                 "What holds the optimum at 200 kPa, and what it would gain if relaxed. Non-negative "
-                "multipliers "
-                f"leave {max(one.residual, two.residual):.1%} of the gradient unbalanced.",
+                f"multipliers leave {max(one.residual, two.residual):.1%} of the gradient unbalanced.",
             ),
             Text(
                 f"Case I ends at n = {free.x[4]:.0f} strands of R_br = {free.x[3] * 1e3:.1f} mm, of which "

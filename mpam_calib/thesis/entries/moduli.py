@@ -75,8 +75,7 @@ def _table_4_3(ledger: Ledger) -> None:
                 allow=spread,
                 note="from Table 4.4's line and the other levels" if (k, i) != (3, 0) else "",
                 misprint=f"repeats E_2 of its row; Table 4.4's intercept implies {value:.5e} (± "
-                f"{spread:.0f}), with "
-                "which Table 4.5's R² of E_4 is 0.9938 (with the printed value 0.037)",
+                f"{spread:.0f}), with which Table 4.5's R² of E_4 is 0.9938 (with the printed value 0.037)",
             )
 
 

@@ -34,9 +34,8 @@ def _table_3_2(ledger: Ledger, chapter: Chapter3) -> None:
         "R_br (mm)",
         printed.text("Case I", "R_br (mm)"),
         one.x[3] / MM,
-        misprint="0.0025 m = 2.5 mm, the upper bound; 0.0025 mm is below the lower bound 0.005 mm of "
-        "Table 3.1, "
-        f"and with n = 50 would cost {loss(200, 0.0025, 50):.0f} N",
+        misprint="0.0025 m = 2.5 mm, the upper bound; 0.0025 mm is below the lower bound 0.005 mm of Table "
+        f"3.1, and with n = 50 would cost {loss(200, 0.0025, 50):.0f} N",
     )
     ledger.check(
         printed.source,
@@ -166,9 +165,8 @@ def _table_3_5(ledger: Ledger, chapter: Chapter3) -> None:
             by_n[n] if row != "100" else by_n[50],
             note=f"with n = {n}; {optimum}",
             misprint=f"columns swapped and a digit slipped: Case I with n = 50 is {by_n[50]:.5f} N, which "
-            "stands in the "
-            f"Case II column; 39.70377 is Case II's {best_force(P):.6f} cut off after five decimals, a 9 "
-            "read as 0",
+            f"stands in the Case II column; 39.70377 is Case II's {best_force(P):.6f} cut off after five "
+            "decimals, a 9 read as 0",
         )
         ledger.check(
             printed.source,

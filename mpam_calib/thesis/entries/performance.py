@@ -57,7 +57,6 @@ def enter(ledger: Ledger) -> None:
             printed.text(row, CONTRACTION),
             100.0 * root,
             allow=allow,
-            note=f"decoded at 250 kPa, the highest pressure that it was measured at (not the 300 kPa of "
-            "the table's title); digits "
-            f"of the moduli allow ± {allow:.2f}",
+            note="decoded at 250 kPa, the highest pressure that it was measured at (not the 300 kPa of the "
+            f"table's title); digits of the moduli allow ± {allow:.2f}",
         )

@@ -178,10 +178,9 @@ def _optimisation(ledger: Ledger, chapter: Chapter3) -> None:
             f"{starts.runs} random starts, {method}",
             "reached the optimum to 1e-5 N",
             reached,
-            f"{starts.evaluations_mean:.0f} evaluations on average in all, {starts.evaluations_max} at "
-            "most; the global stage alone, cut "
-            f"short at {SHORT} generations, stopped between {starts.lowest_global:.1f} and "
-            f"{starts.highest_global:.1f} N",
+            f"{starts.evaluations_mean:.0f} evaluations on average in all, {starts.evaluations_max} at most; "
+            f"the global stage alone, cut short at {SHORT} generations, stopped between "
+            f"{starts.lowest_global:.1f} and {starts.highest_global:.1f} N",
         )
 
 
@@ -247,9 +246,8 @@ def _experiments(ledger: Ledger) -> None:
         "MPAM1",
         "dead-band (kPa)",
         "20",
-        "measurement lost. A muscle that starts at 20 kPa would be 100 % off there, yet errors are said "
-        "to be below 10 %; "
-        "computed: where the decoded blocked force would be 0",
+        "measurement lost. A muscle that starts at 20 kPa would be 100 % off there, yet errors are said to "
+        "be below 10 %; computed: where the decoded blocked force would be 0",
         _zero_pressure("MPAM1"),
     )
     for level, factor in zip(laws.P_KPA, decoded.blocked_ratio(), strict=True):
