@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mpam_calib.design.blocked import blocked_force, braid_loss, gaylord_force
 from mpam_calib.design.optimality import Optimality, optimality
-from mpam_calib.design.problem import E_BR, case_one, case_two
+from mpam_calib.design.problem import E_BR, RATIO_LOW, case_one, case_two
 from mpam_calib.design.search import Optimum, hybrid
 from mpam_calib.design.sensitivity import around, of_ratio_bound
 from mpam_calib.thesis.tables import table
@@ -42,19 +42,19 @@ def loss(P_kPa: float, R_br_mm: float, n: float) -> float:
     return float(braid_loss(np.asarray(P_kPa * KPA), R, ALPHA, np.asarray(R_br_mm * MM), np.asarray(n), E_BR))
 
 
-def strands_that_fit(R_br_mm: float = 2.5) -> float:
-    """Strands of one direction that fit round R = 3 mm at α = 72°."""
-    return float(np.floor(np.pi * R / MM * np.sin(ALPHA) / R_br_mm))
+def strands_that_fit() -> float:
+    """Strands of one direction, of R_br = 2.5 mm, that fit round R = 3 mm at α = 72°."""
+    return float(np.floor(np.pi * R / MM * np.sin(ALPHA) / 2.5))
 
 
-def best_wall(ratio: float = 0.4) -> float:
-    """Closed form of Case II's wall at the active constraint, mm: R(1 − √(1 − ratio))."""
-    return float(R / MM * (1.0 - np.sqrt(1.0 - ratio)))
+def best_wall() -> float:
+    """Closed form of Case II's wall at the active constraint on V_bl/V, mm: R(1 − √(1 − 0.4))."""
+    return float(R / MM * (1.0 - np.sqrt(1.0 - RATIO_LOW)))
 
 
-def best_force(P_kPa: float, ratio: float = 0.4) -> float:
-    """Closed form of Case II's optimum, N: PπR²(2√(1 − ratio)·T − (1 − ratio))."""
-    root = np.sqrt(1.0 - ratio)
+def best_force(P_kPa: float) -> float:
+    """Closed form of Case II's optimum, N: PπR²(2√(1 − 0.4)·T − (1 − 0.4))."""
+    root = np.sqrt(1.0 - RATIO_LOW)
     return float(P_kPa * KPA * np.pi * R**2 * (2.0 * root * np.tan(ALPHA) ** 2 - root**2))
 
 

@@ -7,8 +7,6 @@ reconstructed, never measured.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
@@ -79,19 +77,22 @@ def force(P: Array, gamma: Array, E: Array, convention: str = "stretch") -> Arra
     return gas_and_thickness(P, gamma) + bladder
 
 
-def first_root(P: float, E: Array, convention: str = "stretch", limit: float = 0.6) -> float:
+def first_root(P: float, E: Array, limit: float = 0.6) -> float:
     """Free contraction: first root of F(γ); 0 where F(0) <= 0, nan where F > 0 up to ``limit``."""
     grid = np.linspace(0.0, limit, 1201)
-    f = force(np.asarray(P), grid, E, convention)
+    f = force(np.asarray(P), grid, E)
     if f[0] <= 0.0:
         return 0.0
     below = np.flatnonzero(f < 0.0)
     if below.size == 0:
         return float("nan")
     i = int(below[0])
-    return float(
-        brentq(lambda g: float(force(np.asarray(P), np.asarray(g), E, convention)), grid[i - 1], grid[i])
-    )
+    return float(brentq(lambda g: float(force(np.asarray(P), np.asarray(g), E)), grid[i - 1], grid[i]))
+
+
+def free_contractions(muscle: str) -> Array:
+    """Free contraction at each level, (5,)."""
+    return np.array([first_root(float(P), E) for P, E in zip(LEVELS, moduli(muscle), strict=True)])
 
 
 def strand_friction(P: Array, gamma: Array, f_s: float = F_S) -> Array:
@@ -106,30 +107,26 @@ def coulomb_factors() -> Array:
     return values
 
 
-@dataclass(frozen=True)
-class Curves:
-    """A muscle's five decoded curves on one grid: pressures (5,), contraction (n,), force (5, n) in SI."""
-
-    pressure: Array
-    contraction: Array
-    force: Array
+def curves(muscle: str, contraction: Array) -> Array:
+    """Force (5, n), N, along contractions (n,): what Tables 4.3 (corrected) and 4.7 decode to."""
+    return force(LEVELS[:, None], contraction, moduli(muscle)[:, None, :])
 
 
-def decoded_curves(muscle: str, contraction: Array) -> Curves:
-    """The friction-free curves that Tables 4.3 (corrected) and 4.7 decode to."""
-    E = moduli(muscle)
-    f = np.stack([force(np.asarray(p), contraction, e) for p, e in zip(LEVELS, E, strict=True)])
-    return Curves(LEVELS, np.asarray(contraction, dtype=float), f)
+def blocked_forces(muscle: str) -> Array:
+    """Force at γ = 0 at each level, N, (5,)."""
+    return curves(muscle, np.zeros(1))[:, 0]
 
 
 def blocked_ratio() -> Array:
     """MPAM2's blocked force over MPAM1's at each level, (5,)."""
-    first, second = (decoded_curves(muscle, np.zeros(1)).force[:, 0] for muscle in ("MPAM1", "MPAM2"))
-    return second / first
+    return blocked_forces("MPAM2") / blocked_forces("MPAM1")
+
+
+def bladder_force(P: Array, gamma: Array, E: Array) -> Array:
+    """F_NL, what the bladder adds to gas and thickness, N; broadcasts like :func:`force`."""
+    return force(P, gamma, E) - gas_and_thickness(P, gamma)
 
 
 def bladder_at_rest(muscle: str) -> Array:
-    """F_NL at γ = 0, what the bladder adds to the blocked force at each level (N), (5,)."""
-    zero = np.asarray(0.0)
-    pairs = zip(LEVELS, moduli(muscle), strict=True)
-    return np.array([float(force(P, zero, E) - gas_and_thickness(P, zero)) for P, E in pairs])
+    """F_NL at γ = 0 at each level, N, (5,)."""
+    return bladder_force(LEVELS, np.asarray(0.0), moduli(muscle))

@@ -49,11 +49,11 @@ def _readings() -> list[Erratum]:
         kind: [orders.order_fit("MPAM1", limit, M, kind).squared_correlation for M in (1, 2, 3)]
         for kind in ("stretch", "engineering")
     }
-    gas = orders.order_table("MPAM1", decoded.first_root(2e5, E[3]), range(1, 2))[0]
+    gas = orders.gas_fit("MPAM1", decoded.first_root(2e5, E[3]))
     root = 100.0 * decoded.first_root(2.5e5, E[4])
     law = laws.double_exponential(table("4.9").values(), laws.P_KPA)
     lost = decoded.force(decoded.LEVELS, np.asarray(0.0), law)
-    true = decoded.decoded_curves("MPAM2", np.zeros(1)).force[:, 0]
+    true = decoded.blocked_forces("MPAM2")
     E2 = decoded.moduli("MPAM2")[4]
     return [
         Erratum(
@@ -94,6 +94,7 @@ def _equations() -> list[Erratum]:
     E2 = np.abs(decoded.moduli("MPAM2"))
     smaller = E2[1:] / E2[0]
     share = decoded.blocked_ratio()
+    nonlinear = float(decoded.bladder_force(np.asarray(2e5), np.asarray(0.05), decoded.moduli("MPAM1")[3]))
     return [
         Erratum(
             "Eq. 2.44 in 4.13",
@@ -105,7 +106,7 @@ def _equations() -> list[Erratum]:
             "Eq. 2.48",
             "F = |F_ideal| − |F_braid| − |F_nonlinearity| ∓ |F_f|",
             "F_NL is added with its sign",
-            f"F_NL of MPAM1 at 200 kPa, γ = 0.05 is {_nonlinear(0.05):+.1f} N.",
+            f"F_NL of MPAM1 at 200 kPa, γ = 0.05 is {nonlinear:+.1f} N.",
         ),
         Erratum(
             "Eq. 4.9",
@@ -209,11 +210,6 @@ def _second_part() -> float:
     c, d, w, z = table("4.9").values()[:, 4]
     first, second = c * np.exp(100.0 * d), w * np.exp(100.0 * z)
     return float(abs(second / (first + second)))
-
-
-def _nonlinear(gamma: float) -> float:
-    P, g = np.asarray(2e5), np.asarray(gamma)
-    return float(decoded.force(P, g, decoded.moduli("MPAM1")[3]) - decoded.gas_and_thickness(P, g))
 
 
 def _order_four() -> float:

@@ -11,12 +11,12 @@ from mpam_calib.thesis import decoded
 Array = NDArray[np.float64]
 
 
-def coulomb_factor(model: Array, measured: Array, sign: Array, relative: bool = True) -> float:
-    """K_f >= 0 that minimises Σ((F(1 + K_f s) − F_exp)/F_exp)² (Eq. 4.17; absolute if not relative).
+def coulomb_factor(model: Array, measured: Array, sign: Array) -> float:
+    """K_f >= 0 that minimises Σ((F(1 + K_f s) − F_exp)/F_exp)² (Eq. 4.17).
 
     Arrays of one length: friction-free force, measured force (N), direction +1 loading, −1 unloading.
     """
-    weight = 1.0 / measured if relative else np.ones_like(measured)
+    weight = 1.0 / measured
     column, target = model * sign * weight, (measured - model) * weight
     return max(float(column @ target / (column @ column)), 0.0)
 

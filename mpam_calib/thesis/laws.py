@@ -81,12 +81,14 @@ def exponential(E: Array, start: tuple[float, float], z_fixed: bool = False) -> 
     return exponential_at(E, float(found.x[0]) * d0, z0 if z_fixed else float(found.x[1]) * z0)
 
 
-def force_error(muscle: str, moduli: Array, contraction: float = 0.0) -> Array:
-    """Force by other moduli (5, M) minus the decoded force, N, at each level."""
-    gamma = np.asarray(contraction)
-    return decoded.force(decoded.LEVELS, gamma, moduli) - decoded.force(
-        decoded.LEVELS, gamma, decoded.moduli(muscle)
-    )
+def force_error(muscle: str, moduli: Array) -> Array:
+    """Blocked force by other moduli (5, M) minus the decoded one, N, at each level."""
+    return decoded.force(decoded.LEVELS, np.asarray(0.0), moduli) - decoded.blocked_forces(muscle)
+
+
+def blocked_line(muscle: str) -> Array:
+    """Slope (N/kPa) and intercept (N) of the line through the decoded blocked forces, (2,)."""
+    return np.polyfit(P_KPA, decoded.blocked_forces(muscle), 1)
 
 
 @dataclass(frozen=True)
@@ -156,10 +158,10 @@ def joint_double_exponential(muscle: str, order: int) -> Joint:
 def _stacked(muscle: str, order: int, basis: Array, levels: slice) -> tuple[Array, Array, Array]:
     """Columns, target (force without gas and thickness) and force of the chosen levels, stacked."""
     X = decoded.columns(GRID, order)
-    curves = decoded.decoded_curves(muscle, GRID)
+    force = decoded.curves(muscle, GRID)
     gas = decoded.gas_and_thickness(decoded.LEVELS[:, None], GRID)
     columns = np.concatenate([np.hstack([value * X for value in row]) for row in basis[levels]])
-    return columns, (curves.force - gas)[levels].ravel(), curves.force[levels].ravel()
+    return columns, (force - gas)[levels].ravel(), force[levels].ravel()
 
 
 def _best_rates(

@@ -41,10 +41,10 @@ def curve(muscle: str, limit: float) -> tuple[Array, Array]:
     return gamma, decoded.force(P, gamma, decoded.moduli(muscle)[LEVEL])
 
 
-def gas_correlation(muscle: str, limit: float) -> float:
-    """The thesis's R² of F_{G+t} over contractions up to ``limit``."""
+def gas_fit(muscle: str, limit: float) -> Fit:
+    """F_{G+t} alone over contractions up to ``limit``."""
     gamma, F = curve(muscle, limit)
-    return squared_correlation(decoded.gas_and_thickness(decoded.LEVELS[LEVEL], gamma), F)
+    return _fit("F_{G+t}", decoded.gas_and_thickness(decoded.LEVELS[LEVEL], gamma), F)
 
 
 def range_from_print(muscle: str, printed: float) -> float:
@@ -55,9 +55,13 @@ def range_from_print(muscle: str, printed: float) -> float:
     """
     # R² falls with the range here; beyond 0.9 of free contraction relative residuals blow up.
     low, high = 0.15, 0.95 * decoded.first_root(2e5, decoded.moduli(muscle)[LEVEL])
-    if (gas_correlation(muscle, low) - printed) * (gas_correlation(muscle, high) - printed) > 0:
+
+    def excess(limit: float) -> float:
+        return gas_fit(muscle, limit).squared_correlation - printed
+
+    if excess(low) * excess(high) > 0:
         return float("nan")
-    return float(brentq(lambda g: gas_correlation(muscle, g) - printed, low, high, xtol=1e-6))
+    return float(brentq(excess, low, high, xtol=1e-6))
 
 
 def order_fit(muscle: str, limit: float, order: int, convention: str = "stretch") -> Fit:
@@ -68,15 +72,15 @@ def order_fit(muscle: str, limit: float, order: int, convention: str = "stretch"
     return _fit(f"M = {order}", G + X @ least_squares(X, F - G, 1.0 / F), F, order)
 
 
-def order_table(muscle: str, limit: float, orders: range, convention: str = "stretch") -> list[Fit]:
+def order_table(muscle: str, limit: float, orders: range) -> list[Fit]:
     """F_{G+t}, with the material's moduli (Table 4.1), then with fitted moduli of each order."""
     gamma, F = curve(muscle, limit)
-    P = decoded.LEVELS[LEVEL]
-    rows = [
-        _fit("F_{G+t}", decoded.gas_and_thickness(P, gamma), F),
-        _fit("E_k of the material", decoded.force(P, gamma, MATERIAL, "engineering"), F),
+    material = decoded.force(decoded.LEVELS[LEVEL], gamma, MATERIAL, "engineering")
+    return [
+        gas_fit(muscle, limit),
+        _fit("E_k of the material", material, F),
+        *(order_fit(muscle, limit, order) for order in orders),
     ]
-    return rows + [order_fit(muscle, limit, order, convention) for order in orders]
 
 
 def tabled_order(muscle: str) -> int:

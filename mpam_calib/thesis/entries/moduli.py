@@ -49,13 +49,13 @@ def recovered(k: int, level: int) -> tuple[float, float]:
     return float(value[i]), float(spread[i])
 
 
-def significant_half_unit(text: str, digits: int = 4) -> float:
+def significant_half_unit(text: str) -> float:
     """Half a unit of the fourth digit: Tables 4.4 and 4.9 print four, without trailing zeros.
 
     >>> significant_half_unit("1.4e6")
     500.0
     """
-    return float(0.5 * 10.0 ** (np.floor(np.log10(abs(number(text)))) - digits + 1))
+    return float(0.5 * 10.0 ** (np.floor(np.log10(abs(number(text)))) - 3.0))
 
 
 def _table_4_3(ledger: Ledger) -> None:
@@ -181,7 +181,7 @@ def _force_of_the_laws(ledger: Ledger) -> None:
     )
     for source, muscle, E, why in cases:
         error = laws.force_error(muscle, E)
-        true = decoded.decoded_curves(muscle, np.zeros(1)).force[:, 0]
+        true = decoded.blocked_forces(muscle)
         for i, P in enumerate(laws.P_KPA):
             ledger.unprinted(
                 source,

@@ -78,7 +78,7 @@ def _selection(ledger: Ledger, selection: OrderTable) -> None:
             ledger.lost(printed.source, "R^2", column, text, note, fit.squared_correlation)
     _strains(ledger, selection)
     whole = decoded.first_root(2e5, decoded.moduli(selection.muscle)[orders.LEVEL])
-    gas = orders.order_table(selection.muscle, whole, range(1, 2))[0]
+    gas = orders.gas_fit(selection.muscle, whole)
     ledger.unprinted(
         printed.source,
         "1 − SSE/SST",

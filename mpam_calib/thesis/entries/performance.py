@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mpam_calib.thesis import decoded
+from mpam_calib.thesis import decoded, laws
 from mpam_calib.thesis.ledger import Ledger
 from mpam_calib.thesis.tables import half_unit, table
 
@@ -12,18 +12,18 @@ FORCE, CONTRACTION = "Blocked Force (N)", "Free Contraction (%)"
 OWN = {"Present work (MPAM_1)": "MPAM1", "Present work (MPAM_2)": "MPAM2"}
 
 
-def rounding_of_root(muscle: str, level: int) -> float:
-    """Largest change of a decoded free contraction within the last digits of its moduli."""
+def root_and_rounding(muscle: str) -> tuple[float, float]:
+    """Decoded free contraction at 250 kPa, and its largest change within the last digits of its moduli."""
     printed = table(decoded.MUSCLES[muscle])
-    half = np.array([half_unit(text) for text in printed.cells[level]])
-    E = decoded.moduli(muscle)[level]
-    P = decoded.LEVELS[level]
+    half = np.array([half_unit(text) for text in printed.cells[-1]])
+    E = decoded.moduli(muscle)[-1]
+    P = decoded.LEVELS[-1]
     root = decoded.first_root(float(P), E)
     h = 1e-5
     slope = float(decoded.force(P, np.asarray(root + h), E) - decoded.force(P, np.asarray(root - h), E)) / (
         2 * h
     )
-    return float(np.abs(decoded.columns(np.asarray(root), E.size)) @ half / abs(slope))
+    return root, float(np.abs(decoded.columns(np.asarray(root), E.size)) @ half / abs(slope))
 
 
 def enter(ledger: Ledger) -> None:
@@ -37,8 +37,6 @@ def enter(ledger: Ledger) -> None:
                 )
             continue
         muscle = OWN[row]
-        F0 = decoded.decoded_curves(muscle, np.zeros(1)).force[:, 0]
-        line = np.polyfit(decoded.LEVELS / 1e3, F0, 1)
         ledger.lost(
             printed.source,
             row,
@@ -46,10 +44,10 @@ def enter(ledger: Ledger) -> None:
             printed.text(row, FORCE),
             "measured at 300 kPa; computed: the line through the five decoded values, extrapolated from "
             "250 kPa" + ("; the text has 136 N" if muscle == "MPAM2" else ""),
-            float(np.polyval(line, 300.0)),
+            float(np.polyval(laws.blocked_line(muscle), 300.0)),
         )
-        root = decoded.first_root(float(decoded.LEVELS[4]), decoded.moduli(muscle)[4])
-        allow = 100.0 * rounding_of_root(muscle, 4)
+        root, rounding = root_and_rounding(muscle)
+        allow = 100.0 * rounding
         ledger.check(
             printed.source,
             row,

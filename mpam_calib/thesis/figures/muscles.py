@@ -29,7 +29,7 @@ def outputs(bands: dict[str, MuscleBands]) -> Figure:
         left, middle, right = figure.subplots(1, 3)
         left.plot(P, [force(p, 0.7) for p in P], color=style.INK, label="Eq. 3.16, t = 0.7 mm")
         for muscle, colour in COLOURS.items():
-            F0 = decoded.decoded_curves(muscle, np.zeros(1)).force[:, 0]
+            F0 = decoded.blocked_forces(muscle)
             left.plot(laws.P_KPA, F0, "o", color=colour, markersize=4, label=f"{muscle}, decoded")
             _band(left, bands.get(muscle), "blocked_force_N", colour, 1.0)
             _free(right, muscle, colour)
@@ -48,8 +48,7 @@ def outputs(bands: dict[str, MuscleBands]) -> Figure:
 
 def _free(ax: Axes, muscle: str, colour: str) -> None:
     """Decoded free contractions of a muscle, and Table 4.12's value."""
-    pairs = zip(decoded.LEVELS, decoded.moduli(muscle), strict=True)
-    roots = [100.0 * decoded.first_root(float(P), E) for P, E in pairs]
+    roots = 100.0 * decoded.free_contractions(muscle)
     ax.plot(laws.P_KPA, roots, "o-", color=colour, markersize=4, label=f"{muscle}, decoded")
     value = table("4.12").value(f"Present work (MPAM_{muscle[-1]})", "Free Contraction (%)")
     ax.plot(250.0, value, "x", color=colour, markersize=8, label=f"{muscle}, Table 4.12")
