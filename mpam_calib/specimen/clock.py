@@ -68,16 +68,14 @@ class Clock:
             time = whole["time_s"].to_numpy()
             usual = usual or usual_tick(time[:FIRST])
             # The last tick of a block may go on in the next.
-            last = int(np.searchsorted(time, time[-1]))
-            tick = float(time[last] - time[last - 1]) if last else tick
+            last, tick = _last_tick(time, tick)
             rest = whole.iloc[last:]
             if last:
                 yield whole.iloc[:last].assign(time_s=spread_ticks(time[:last], float(time[last]), usual))
         assert rest is not None  # a file without rows is refused
         self._refuse_slips()
         time = rest["time_s"].to_numpy()
-        last = int(np.searchsorted(time, time[-1]))
-        tick = float(time[last] - time[last - 1]) if last else tick
+        _, tick = _last_tick(time, tick)
         if self.repeated and not tick:
             found = f"{time[0]:.10g} in every row (a clock that stands still)"
             raise InputError(self.file.label, found, EXPECTED, None, "time_s")
@@ -114,6 +112,12 @@ class Clock:
             row, time = self.first
             found = f"{time:.10g} after {time:.10g} (the time of the row before again)"
             raise InputError(self.file.label, found, EXPECTED, row, "time_s")
+
+
+def _last_tick(time: Floats, before: float) -> tuple[int, float]:
+    """Where the last of the times (n,), s, begins, and the step to it: as ``before`` where there is none."""
+    last = int(np.searchsorted(time, time[-1]))
+    return last, float(time[last] - time[last - 1]) if last else before
 
 
 def usual_tick(time: Floats) -> Usual:

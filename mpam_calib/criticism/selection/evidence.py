@@ -5,7 +5,7 @@ Each works on a model's fits, one for each size of the remainder, and sums over 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import log
 from types import MappingProxyType
@@ -94,7 +94,7 @@ def log_evidence_beyond_laplace(
     """
     slow = many_parameters(fits) or blueprint.simulation.law == OWN_RATES
     worth = worth if slow else -np.inf
-    terms, inner = _sizes(problem, blueprint, fits, worth=worth, rates=rates, rule=_expanded)
+    terms, inner = _sizes(problem, blueprint, fits, worth=worth, rates=rates)
     value = float(np.logaddexp.reduce(list(terms.values())))
     return value, _error(terms, {size: found.error for size, (_, found) in inner.items()})
 
@@ -104,7 +104,7 @@ def weigh(problem: Problem, blueprint: Blueprint, fits: list[Fit], seed: int) ->
 
     For models of at most SETTLES parameters.
     """
-    terms, inner = _sizes(problem, blueprint, fits, rule=_expanded)
+    terms, inner = _sizes(problem, blueprint, fits)
     quadrature = float(np.logaddexp.reduce(list(terms.values())))
     own = _error(terms, {size: found.error for size, (_, found) in inner.items()})
     if not inner:
@@ -122,7 +122,7 @@ def under_other_priors(problem: Problem, blueprint: Blueprint, fits: list[Fit], 
     """
 
     def total(widths: tuple[float, float], worth: float = -np.inf) -> float:
-        terms, _ = _sizes(problem, blueprint, fits, widths, worth, rule=_expanded)
+        terms, _ = _sizes(problem, blueprint, fits, widths, worth)
         return float(np.logaddexp.reduce(list(terms.values())))
 
     if many_parameters(fits):
@@ -150,12 +150,10 @@ def _sizes(
     widths: tuple[float, float] = AS_DECLARED,
     worth: float = -np.inf,
     rates: Mapping[int, Rates] = MappingProxyType({}),
-    rule: Callable[[Density, Mode], Evidence] = integrate,
 ) -> tuple[dict[int, float], dict[int, tuple[Hypothesis, Evidence]]]:
     """Terms of the sum by size, and the densities behind those that were integrated.
 
     ``widths`` as in WIDTHS; where Laplace's figures are not ``worth`` more (nats), they will do.
-    ``rule`` integrates up to SETTLES parameters.
     """
     terms = {f.size: f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits}
     best, laplace = max(terms.values()), np.logaddexp.reduce(list(terms.values()))
@@ -179,7 +177,7 @@ def _sizes(
     for size in sorted(modes, key=lambda s: -terms[s]):
         if terms[size] < best - NEGLIGIBLE:
             break
-        integral = _integral(*modes[size], rates.get(size)) if many else rule(*modes[size])
+        integral = _integral(*modes[size], rates.get(size)) if many else _expanded(*modes[size])
         if not many and not integral.reliable:
             integral = integrate_refitted(*modes[size])
         terms[size] = integral.value + log(SIZE_PRIOR[size])

@@ -105,8 +105,6 @@ def structure_tests(problem: Problem, fitted: Fit) -> list[Structure]:
 
 def _basis(columns: Array) -> Array:
     """Orthonormal columns that span the given ones, (n, rank)."""
-    if columns.shape[1] == 0:
-        return np.zeros((len(columns), 0))
     norms = np.linalg.norm(columns, axis=0)
     columns = columns[:, norms > 0.0] / norms[norms > 0.0]
     if columns.shape[1] == 0:

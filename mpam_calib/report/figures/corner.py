@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mpam_calib.report.figures import style
-from mpam_calib.report.figures.density import density, joint_density, mass_levels, spans
+from mpam_calib.report.figures.density import density, joint_density, limits, mass_levels, spread_parameters
 from mpam_calib.report.figures.labels import axis_scale
 from mpam_calib.report.view import CalibrationView, Floats
 
@@ -22,7 +22,7 @@ LEFT, BOTTOM, RIGHT, GAP = 0.85, 0.5, 0.1, 0.1
 
 def draw(view: CalibrationView) -> Figure:
     """Lower triangle of pairs with the regions that hold 50 % and 90 %; densities on the diagonal."""
-    names = [name for name in view.shown_parameters() if spans(view.draws[name])]
+    names = spread_parameters(view)
     scales = [axis_scale(view, name) for name in names]
     draws = [factor * view.draws[name] for name, (factor, _) in zip(names, scales, strict=True)]
     labels = [label for _, label in scales]
@@ -42,14 +42,14 @@ def draw(view: CalibrationView) -> Figure:
                     ax.set_title(names[row], fontsize=7.5, loc="center")
                 else:
                     _pair(ax, draws[column], draws[row])
-                ax.set_xlim(*_limits(draws[column]))
+                ax.set_xlim(*limits(draws[column]))
                 _frame(ax, labels, row, column, cell - GAP)
     return figure
 
 
 def correlations(view: CalibrationView) -> list[tuple[str, str, float]]:
     """Pairs of shown parameters with their correlation, strongest first."""
-    names = [name for name in view.shown_parameters() if spans(view.draws[name])]
+    names = spread_parameters(view)
     if len(names) < 2:
         return []
     matrix: Floats = np.atleast_2d(np.corrcoef(np.stack([view.draws[name] for name in names])))
@@ -58,7 +58,7 @@ def correlations(view: CalibrationView) -> list[tuple[str, str, float]]:
 
 
 def _diagonal(ax: Axes, draws: Floats) -> None:
-    low, high = _limits(draws)
+    low, high = limits(draws)
     x = np.linspace(low, high, 120)
     y = density(draws, x)
     ax.fill_between(x, y, color=style.BLUE, alpha=0.30, linewidth=0)
@@ -71,13 +71,7 @@ def _pair(ax: Axes, x: Floats, y: Floats) -> None:
     levels = mass_levels(height, MASSES)
     if levels[0] < levels[1] < float(height.max()):
         ax.contourf(cx, cy, height, levels=[*levels, float(height.max())], colors=["#b3d2e6", "#5aa0cb"])
-    ax.set_ylim(*_limits(y))
-
-
-def _limits(draws: Floats) -> tuple[float, float]:
-    low, high = np.quantile(draws, [0.002, 0.998])
-    room = 0.12 * (high - low)
-    return float(low - room), float(high + room)
+    ax.set_ylim(*limits(y))
 
 
 def _frame(ax: Axes, labels: list[str], row: int, column: int, size: float) -> None:

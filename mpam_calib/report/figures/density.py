@@ -4,13 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from mpam_calib.report.view import Floats
+from mpam_calib.report.view import CalibrationView, Floats
 
 
 def spans(draws: Floats) -> bool:
     """Whether the draws spread at all: a constant has no density."""
     good = draws[np.isfinite(draws)]
     return len(good) > 1 and float(np.ptp(good)) > 1e-12 * float(np.abs(good).max())
+
+
+def spread_parameters(view: CalibrationView) -> list[str]:
+    """The shown parameters whose draws spread."""
+    return [name for name in view.shown_parameters() if spans(view.draws[name])]
+
+
+def limits(draws: Floats) -> tuple[float, float]:
+    """Where an axis for draws begins and ends: nearly all of them, and some room."""
+    low, high = np.quantile(draws, [0.002, 0.998])
+    room = 0.12 * (high - low)
+    return float(low - room), float(high + room)
 
 
 def density(draws: Floats, at: Floats) -> Floats:
@@ -39,8 +51,7 @@ def density(draws: Floats, at: Floats) -> Floats:
 
 def joint_density(x: Floats, y: Floats, bins: int = 36) -> tuple[Floats, Floats, Floats]:
     """Smoothed histogram of pairs of draws: centres of x, centres of y, and density (bins y, bins x)."""
-    ranges = [_range(x), _range(y)]
-    counts, ex, ey = np.histogram2d(x, y, bins=bins, range=ranges)
+    counts, ex, ey = np.histogram2d(x, y, bins=bins, range=[limits(x), limits(y)])
     taps = np.exp(-0.5 * (np.arange(-6, 7) / 1.9) ** 2)
     taps /= taps.sum()
     for axis in (0, 1):
@@ -54,9 +65,3 @@ def mass_levels(density: Floats, masses: tuple[float, ...]) -> list[float]:
     total = np.cumsum(ordered)
     total /= total[-1]
     return sorted(float(ordered[np.searchsorted(total, mass)]) for mass in masses)
-
-
-def _range(x: Floats) -> tuple[float, float]:
-    low, high = np.quantile(x, [0.002, 0.998])
-    room = 0.12 * (high - low)
-    return float(low - room), float(high + room)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mpam_calib.report.figures import style
-from mpam_calib.report.figures.density import density, spans
+from mpam_calib.report.figures.density import density, spans, spread_parameters
 from mpam_calib.report.figures.labels import axis_scale
 from mpam_calib.report.view import CalibrationView, Floats
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def draw(view: CalibrationView) -> Figure:
     """A panel for each headline parameter: posterior filled, prior as a grey line."""
-    names = [name for name in view.shown_parameters() if spans(view.draws[name])]
+    names = spread_parameters(view)
     columns = min(4, max(len(names), 1))
     rows = max(1, math.ceil(len(names) / columns))
     with style.applied({"axes.grid": False}):
