@@ -83,15 +83,11 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Figure:
-    """A matplotlib figure with its caption and a description for those who cannot see it.
-
-    Embedded as SVG, or as PNG where dense content would make the SVG large.
-    """
+    """A matplotlib figure with its caption and a description for those who cannot see it."""
 
     figure: MplFigure
     caption: str
     alt: str
-    format: Literal["svg", "png"] = "svg"
     kind: ClassVar[str] = "figure"
 
     @property
@@ -104,7 +100,7 @@ class Figure:
         """The drawing as a data URI, the same bytes for the same figure; closes the figure."""
         from mpam_calib.report.embed import data_uri
 
-        return data_uri(self.figure, self.format)
+        return data_uri(self.figure)
 
 
 @dataclass(frozen=True)

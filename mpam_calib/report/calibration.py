@@ -8,11 +8,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from mpam_calib.report import wording
-from mpam_calib.report.figures import corner, loops, pressure, priors, residuals
-from mpam_calib.report.held import held_between
-from mpam_calib.report.numbers import decimals, fixed, significant, with_band
-from mpam_calib.report.one_branch import pull_of
-from mpam_calib.report.page import (
+from mpam_calib.report.blocks import (
     Block,
     DataTable,
     Figure,
@@ -20,10 +16,14 @@ from mpam_calib.report.page import (
     KeyNumber,
     Notice,
     Numbers,
-    Page,
     Section,
     Text,
 )
+from mpam_calib.report.figures import corner, loops, pressure, priors, residuals
+from mpam_calib.report.held import held_between
+from mpam_calib.report.numbers import decimals, fixed, significant, with_band
+from mpam_calib.report.one_branch import pull_of
+from mpam_calib.report.page import Page
 from mpam_calib.report.parameters import RIGHT, learnt_table, summary_table
 from mpam_calib.report.reach import MOST, contraction_band, still_pulling
 from mpam_calib.report.spoken import spoken

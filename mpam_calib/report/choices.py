@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pandas as pd
 
+from mpam_calib.report.blocks import Block, DataTable, Section, Text
 from mpam_calib.report.numbers import probability, superscript
-from mpam_calib.report.page import Block, DataTable, Section, Text
 
 WORDS = {"order": "Orders", "law": "Laws"}
 HUGE = 1e4

@@ -15,11 +15,7 @@ from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.effect import effect
 from mpam_calib.prediction.curves import LIMIT, Reach
 from mpam_calib.prediction.strain_range import MUSCLE
-from mpam_calib.report.design_bounds import beyond_bounds, within
-from mpam_calib.report.designs_table import contraction_band, designs_of, mean_band, same_design
-from mpam_calib.report.figures import designs as figure
-from mpam_calib.report.numbers import fixed, significant, with_band
-from mpam_calib.report.page import (
+from mpam_calib.report.blocks import (
     Block,
     DataTable,
     Figure,
@@ -27,11 +23,15 @@ from mpam_calib.report.page import (
     KeyNumber,
     Notice,
     Numbers,
-    Page,
     Section,
     Text,
     Verdict,
 )
+from mpam_calib.report.design_bounds import beyond_bounds, within
+from mpam_calib.report.designs_table import contraction_band, designs_of, mean_band, same_design
+from mpam_calib.report.figures import designs as figure
+from mpam_calib.report.numbers import fixed, significant, with_band
+from mpam_calib.report.page import Page
 from mpam_calib.report.spoken import spoken
 from mpam_calib.units import DEG, KPA, MM
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from mpam_calib.design.robust import Design
 from mpam_calib.prediction.curves import LIMIT
+from mpam_calib.report.blocks import DataTable
 from mpam_calib.report.design_bounds import marks
 from mpam_calib.report.numbers import fixed, with_band, with_open_end
-from mpam_calib.report.page import DataTable
 from mpam_calib.units import DEG, KPA, MM
 
 if TYPE_CHECKING:

@@ -15,18 +15,12 @@ from mpam_calib.model.bend import FORM, is_bend
 from mpam_calib.model.effect import effect
 from mpam_calib.model.priors import Parameter
 from mpam_calib.report import wording
+from mpam_calib.report.blocks import Block, DataTable, Figure, Section, Text
 from mpam_calib.report.diagnosis_lead import first_screen
 from mpam_calib.report.figures import misfit
 from mpam_calib.report.measurements import not_tested, shown_by, telling
 from mpam_calib.report.numbers import probability, significant, with_band
-from mpam_calib.report.page import (
-    Block,
-    DataTable,
-    Figure,
-    Page,
-    Section,
-    Text,
-)
+from mpam_calib.report.page import Page
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import KPA
 

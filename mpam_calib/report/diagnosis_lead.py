@@ -10,8 +10,8 @@ from markupsafe import Markup
 from mpam_calib.criticism.verdict import LEAD
 from mpam_calib.model.effect import effect
 from mpam_calib.report import wording
+from mpam_calib.report.blocks import Block, Headline, KeyNumber, Notice, Numbers, Verdict
 from mpam_calib.report.numbers import probability, significant
-from mpam_calib.report.page import Block, Headline, KeyNumber, Notice, Numbers, Verdict
 from mpam_calib.report.unremoved import faults_in_readings, only_recording, unremoved
 from mpam_calib.specimen.recording import Specimen
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 import pandas as pd
 
 from mpam_calib.model.effect import effect
-from mpam_calib.report.page import Block, DataTable, Text
+from mpam_calib.report.blocks import Block, DataTable, Text
 from mpam_calib.specimen.recording import Specimen
 
 TESTED: Final = {"order_too_low": "the tensile test, fitted at a higher order and at the muscle's strains"}

@@ -1,6 +1,6 @@
 """The page shell that every command's report uses: blocks in, one self-contained HTML file out.
 
->>> from mpam_calib.report.page import Page, Section, Text
+>>> from mpam_calib.report.blocks import Section, Text
 >>> page = Page("MPAM1", "Calibration", lead=[Text("F < 100 N")], sections=[Section("Data")])
 >>> "F &lt; 100 N" in page.render()
 True
@@ -17,34 +17,7 @@ from pathlib import Path
 import jinja2
 
 from mpam_calib.posterior.chains.checkpoint import write_atomically
-from mpam_calib.report.blocks import (
-    Block,
-    DataTable,
-    Figure,
-    Headline,
-    KeyNumber,
-    Level,
-    Notice,
-    Numbers,
-    Section,
-    Text,
-    Verdict,
-)
-
-__all__ = [
-    "Block",
-    "DataTable",
-    "Figure",
-    "Headline",
-    "KeyNumber",
-    "Level",
-    "Notice",
-    "Numbers",
-    "Page",
-    "Section",
-    "Text",
-    "Verdict",
-]
+from mpam_calib.report.blocks import Block, Notice, Section
 
 
 @lru_cache(maxsize=1)

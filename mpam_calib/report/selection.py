@@ -13,9 +13,10 @@ from mpam_calib.model.blueprint import MaterialPosterior, draw_blueprint
 from mpam_calib.model.nuisance import nuisance_parameters
 from mpam_calib.posterior.likelihood.floor import pulling
 from mpam_calib.posterior.likelihood.points import KINDS, gather_points
+from mpam_calib.report.blocks import Block, DataTable, Headline, Notice, Section, Text, Verdict
 from mpam_calib.report.choices import choices_section
 from mpam_calib.report.numbers import fixed, probability, significant
-from mpam_calib.report.page import Block, DataTable, Headline, Notice, Page, Section, Text, Verdict
+from mpam_calib.report.page import Page
 from mpam_calib.report.wording import left_aside
 from mpam_calib.specimen.recording import Specimen
 

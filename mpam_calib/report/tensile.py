@@ -8,11 +8,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from mpam_calib.report import wording
-from mpam_calib.report.figures import residuals, strain_range
-from mpam_calib.report.figures import tensile as stress_strain
-from mpam_calib.report.headline import first_modulus, stresses
-from mpam_calib.report.numbers import with_band
-from mpam_calib.report.page import (
+from mpam_calib.report.blocks import (
     Block,
     DataTable,
     Figure,
@@ -22,6 +18,10 @@ from mpam_calib.report.page import (
     Section,
     Text,
 )
+from mpam_calib.report.figures import residuals, strain_range
+from mpam_calib.report.figures import tensile as stress_strain
+from mpam_calib.report.headline import first_modulus, stresses
+from mpam_calib.report.numbers import with_band
 from mpam_calib.report.spoken import spoken
 from mpam_calib.report.trust import assess
 from mpam_calib.report.view import CalibrationView

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from mpam_calib.report.page import (
+from mpam_calib.report.blocks import (
     Block,
     DataTable,
     Figure,
@@ -12,10 +12,10 @@ from mpam_calib.report.page import (
     KeyNumber,
     Notice,
     Numbers,
-    Page,
     Section,
     Text,
 )
+from mpam_calib.report.page import Page
 from mpam_calib.thesis import errata as printed_errors
 from mpam_calib.thesis import orders
 from mpam_calib.thesis.chapter3 import MONOFILAMENTS, SHORT, Chapter3, best_force, loss, strands_that_fit

@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 
 from mpam_calib.prediction.left_out import COLUMNS
+from mpam_calib.report.blocks import DataTable, Text
 from mpam_calib.report.calibration import _left_out_section, _pairs_section, calibration_page
 from mpam_calib.report.figures import corner, density, loops, residuals, style
 from mpam_calib.report.numbers import with_band
-from mpam_calib.report.page import DataTable, Text
 from mpam_calib.report.parameters import learnt_table, summary_table
 from mpam_calib.report.view import CalibrationView
 from mpam_calib.report.wording import simulation_sentence

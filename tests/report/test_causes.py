@@ -10,9 +10,9 @@ import pytest
 from criticism.test_hypotheses import problem_of, specimen_of
 
 from mpam_calib.model.effect import effect
+from mpam_calib.report.blocks import DataTable, Notice, Text
 from mpam_calib.report.diagnosis import BENT, FORMS, _alternatives, _causes
 from mpam_calib.report.diagnosis_lead import _next, _unproven
-from mpam_calib.report.page import DataTable, Notice, Text
 
 HOLDS = {
     "held_out": "cycle",

@@ -8,10 +8,11 @@ import pytest
 
 from mpam_calib.design.robust import Design, Packed, designs_table
 from mpam_calib.model.blueprint import Blueprint
+from mpam_calib.report.blocks import DataTable, Headline, Notice, Numbers, Text
 from mpam_calib.report.design_bounds import beyond_bounds
 from mpam_calib.report.designs import DesignsView, designs_page
 from mpam_calib.report.designs_table import contraction_band
-from mpam_calib.report.page import DataTable, Headline, Notice, Numbers, Page, Text
+from mpam_calib.report.page import Page
 from mpam_calib.specimen.declaration import Geometry, Sensors, Simulation
 
 THESIS = Geometry(L0_mm=50.0, R0_mm=3.0, t0_mm=0.7, alpha0_deg=72.0)

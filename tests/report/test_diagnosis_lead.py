@@ -10,10 +10,10 @@ import pytest
 from criticism.test_hypotheses import specimen_of
 
 from mpam_calib.criticism.unexplained.load_cell import FAULT
+from mpam_calib.report.blocks import Headline, Verdict
 from mpam_calib.report.diagnosis import _compared
 from mpam_calib.report.diagnosis_lead import first_screen
 from mpam_calib.report.figures.misfit import residual_maps
-from mpam_calib.report.page import Headline, Verdict
 
 CONTENT: dict[str, Any] = {
     "verdict": "adequate",

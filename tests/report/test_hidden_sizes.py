@@ -9,8 +9,8 @@ from criticism.test_hypotheses import problem_of, specimen_of
 
 from mpam_calib.model.effect import effect
 from mpam_calib.model.priors import Parameter
+from mpam_calib.report.blocks import Text
 from mpam_calib.report.diagnosis import _limits, _without_limit
-from mpam_calib.report.page import Text
 
 IDS = ("length_offset", "rig_compliance")
 """One of either sign, and one that is never below zero."""

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from mpam_calib.model.effect import effect
+from mpam_calib.report.blocks import Block, DataTable
 from mpam_calib.report.diagnosis import _alternatives, _limits
 from mpam_calib.report.measurements import not_tested, shown_by, telling
-from mpam_calib.report.page import Block, DataTable
 
 ORDER = "order_too_low"
 TEST = effect(ORDER).told_by

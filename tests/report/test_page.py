@@ -14,18 +14,18 @@ from markupsafe import Markup
 from matplotlib.figure import Figure as MplFigure
 
 from mpam_calib.posterior.chains.checkpoint import sweep
-from mpam_calib.report.page import (
+from mpam_calib.report.blocks import (
     DataTable,
     Figure,
     Headline,
     KeyNumber,
     Notice,
     Numbers,
-    Page,
     Section,
     Text,
     Verdict,
 )
+from mpam_calib.report.page import Page
 
 NASTY = '<script>alert("x")</script> & "quoted" \'too\''
 
@@ -45,7 +45,6 @@ def page(words: str = "plain") -> Page:
         Numbers([KeyNumber(words, words, words, words, words)]),
         Verdict(words, "caution", [words]),
         Figure(plot(), words, words),
-        Figure(plot(), words, words, format="png"),
         DataTable(frame, words, {words: "{:.2f}"}, collapse=True),
     ]
     return Page(words, words, blocks, [Section(words, blocks, words), Section(words, [])], words)

@@ -14,8 +14,9 @@ from mpam_calib.criticism.selection.held_out import LEVEL_COLUMNS
 from mpam_calib.criticism.selection.odds import odds
 from mpam_calib.criticism.selection.select import COLUMNS, Selection
 from mpam_calib.model.blueprint import MaterialPosterior
+from mpam_calib.report.blocks import DataTable, Headline, Notice, Text, Verdict
 from mpam_calib.report.choices import choice_sentences, choices_section, level_sentence
-from mpam_calib.report.page import DataTable, Headline, Notice, Page, Text, Verdict
+from mpam_calib.report.page import Page
 from mpam_calib.report.selection import evidence_text, ranking_table, selection_page, selection_sentence
 from mpam_calib.specimen.declaration import GeometrySd, Sensors
 from mpam_calib.specimen.recording import ForceMap, FreeContraction, Specimen
