@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from mpam_calib.criticism.data.problem import Problem
+from mpam_calib.criticism.data.problem import SIZE_PRIOR, Problem
 from mpam_calib.criticism.fitting.climb import CONVERGED, Climb, Place, plus_one
 from mpam_calib.criticism.fitting.doubt import doubts
 from mpam_calib.model.blueprint import Blueprint
@@ -57,6 +58,11 @@ class Fit:
     log_evidence: float
     chi2: float
     under: tuple[Under, ...]
+
+    @property
+    def log_share(self) -> float:
+        """Log evidence (nats) with the prior of the remainder's size: the fit's term of a sum over sizes."""
+        return self.log_evidence + log(SIZE_PRIOR[self.size])
 
     @property
     def objective(self) -> float:

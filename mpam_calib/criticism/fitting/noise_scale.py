@@ -12,13 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from math import log
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from mpam_calib.criticism.data.problem import SIZE_PRIOR, SIZES, Problem
+from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import Fit, fit
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.specimen.declaration import Simulation
@@ -85,7 +84,7 @@ def _by_scale(problem: Problem, fits: Iterable[Fit], log_scales: Array) -> Array
         scales = np.append(log_scales, 0.0)
         variance = np.exp(2.0 * scales)[:, None] + remainder
         change = -0.5 * np.sum(residual**2 / variance + np.log(variance), axis=1) + settled * scales
-        terms.append(f.log_evidence + log(SIZE_PRIOR[f.size]) + change[:-1] - change[-1])
+        terms.append(f.log_share + change[:-1] - change[-1])
     return np.asarray(np.logaddexp.reduce(terms, axis=0))
 
 
@@ -122,7 +121,7 @@ def _fits(problem: Problem, blueprint: Blueprint, starts: dict[int, dict[str, fl
 
 
 def _evidence(fits: Iterable[Fit]) -> float:
-    terms = [f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits]
+    terms = [f.log_share for f in fits]
     return float(np.logaddexp.reduce(terms)) if terms else -np.inf
 
 

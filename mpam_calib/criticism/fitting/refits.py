@@ -47,6 +47,11 @@ def ended(found: Fit) -> dict[str, float]:
     return dict(zip(found.names, found.u.tolist(), strict=True))
 
 
+def once_more(found: Fit) -> list[Try]:
+    """One climb, in the forms of a fit and from where it ended."""
+    return [(tuple(sorted(found.effects)), ended(found))]
+
+
 def best_of(task: tuple[int, list[Try], bool]) -> Fit | None:
     """The best of some climbs."""
     size, tries, doubting = task

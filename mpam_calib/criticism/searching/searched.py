@@ -13,7 +13,7 @@ from math import comb, log
 
 import numpy as np
 
-from mpam_calib.criticism.data.problem import SIZE_PRIOR, SIZES, Problem
+from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import Fit
 from mpam_calib.criticism.fitting.forms import flexible
 from mpam_calib.criticism.fitting.refits import (
@@ -25,6 +25,7 @@ from mpam_calib.criticism.fitting.refits import (
     ended,
     in_another_form,
     named_forms,
+    once_more,
     other_forms,
     with_better_forms,
     with_better_kinds,
@@ -102,10 +103,9 @@ class Search:
 
     def refit_like(self, known: Fit) -> Fit | None:
         """The best refit in the forms of another fit, and from where that ended; None where no climb ends."""
-        tries = [(tuple(sorted(known.effects)), ended(known))]
-        tasks = [(size, tries, self.doubting) for size in range(len(SIZES))]
+        tasks = [(size, once_more(known), self.doubting) for size in range(len(SIZES))]
         fits = [f for f in self.spread(best_of, tasks) if f is not None]
-        return max(fits, key=lambda f: f.log_evidence + log(SIZE_PRIOR[f.size]), default=None)
+        return max(fits, key=lambda f: f.log_share, default=None)
 
     def _tries(self, effects: Set, size: int) -> list[Try]:
         """Forms and starts of a set's climbs."""
@@ -118,7 +118,7 @@ class Search:
             starts = [{}, *(far if near is None else [ended(near)])]
             return [((form,), start) for e in effects for form in flexible(e) for start in starts]
         if near is not None:
-            return [(tuple(sorted(near.effects)), ended(near))]
+            return once_more(near)
         # From where the best part ended, and from nothing: a part may have ended in a shape that only
         # made up for what it lacked.
         parts = self._from_parts(effects, size)
@@ -163,8 +163,7 @@ class Search:
         """The set's fit beside a remainder of this size, or of the size that suits it best."""
         if (effects, size) in self.fits:
             return self.fits[effects, size]
-        seen = [s for s in range(len(SIZES)) if (effects, s) in self.fits]
-        return self.best_fit(effects) if seen else None
+        return self.best_fit(effects) if self._of_all_sizes(effects) else None
 
     def polish_all(self, keys: Iterable[tuple[Set, int]]) -> None:
         """Change one form of a set at a time, as long as that helps."""
@@ -176,7 +175,7 @@ class Search:
 
     def polish(self, sets: Iterable[Set]) -> None:
         """Polish sets alone, and beside the remainder that suits each best."""
-        listed = [s for s in sets if any((s, size) in self.fits for size in range(len(SIZES)))]
+        listed = [s for s in sets if self._of_all_sizes(s)]
         self.polish_all((s, size) for s in listed for size in (0, self.best_size(s)))
 
     def even_out(self, sets: Iterable[Set]) -> None:
@@ -188,8 +187,7 @@ class Search:
             for size in range(len(SIZES))
             if (s, size) in self.fits and self.fits[s, size].effects != lead.effects
         ]
-        tries = [[(tuple(sorted(leads[s].effects)), ended(leads[s]))] for s, _ in keys]
-        tasks = [(size, each, self.doubting) for (_, size), each in zip(keys, tries, strict=True)]
+        tasks = [(size, once_more(leads[s]), self.doubting) for s, size in keys]
         for key, fit in zip(keys, self.spread(best_of, tasks), strict=True):
             if fit is not None and fit.log_evidence > self.fits[key].log_evidence:
                 self.fits[key] = fit
@@ -297,8 +295,7 @@ class Search:
         kept |= {s for k in range(1, LARGEST + 1) for s in self.kept(k, WIDTH)}
         made = Search(problem, self.tested, spread, seen=self.seen | {effects for effects, _ in self.fits})
         keys = [key for key in self.fits if key[0] in kept]
-        fits = (self.fits[key] for key in keys)
-        tasks = [(f.size, [(tuple(sorted(f.effects)), ended(f))], False) for f in fits]
+        tasks = [(f.size, once_more(f), False) for f in (self.fits[key] for key in keys)]
         for key, found in zip(keys, spread(best_of, tasks), strict=True):
             if found is not None:
                 made.fits[key] = found
@@ -328,21 +325,20 @@ class Search:
 
     def score_of_best(self, effects: Set) -> float:
         """The same for the likeliest forms alone, summed over the sizes that were refitted."""
-        terms = [
-            self.fits[effects, size].log_evidence + log(SIZE_PRIOR[size])
-            for size in range(len(SIZES))
-            if (effects, size) in self.fits
-        ]
+        terms = [f.log_share for f in self._of_all_sizes(effects)]
         return float(np.logaddexp.reduce(terms)) + self.log_prior(effects)
 
     def best_size(self, effects: Set) -> int:
         """The remainder's size that carries most of a set's posterior."""
-        sizes = [s for s in range(len(SIZES)) if (effects, s) in self.fits]
-        return max(sizes, key=lambda s: self.fits[effects, s].log_evidence + log(SIZE_PRIOR[s]))
+        return self.best_fit(effects).size
 
     def best_fit(self, effects: Set) -> Fit:
-        """The refit beside that remainder."""
-        return self.fits[effects, self.best_size(effects)]
+        """The refit beside the remainder that carries most of a set's posterior."""
+        return max(self._of_all_sizes(effects), key=lambda f: f.log_share)
+
+    def _of_all_sizes(self, effects: Set) -> list[Fit]:
+        """A set's refits, beside the smallest remainder first."""
+        return [self.fits[effects, s] for s in range(len(SIZES)) if (effects, s) in self.fits]
 
     def kept(self, count: int, width: int) -> list[Set]:
         """The best sets with this many effects: by posterior, and by fit alone without a remainder."""

@@ -155,7 +155,7 @@ def _sizes(
 
     ``widths`` as in WIDTHS; where Laplace's figures are not ``worth`` more (nats), they will do.
     """
-    terms = {f.size: f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits}
+    terms = {f.size: f.log_share for f in fits}
     best, laplace = max(terms.values()), np.logaddexp.reduce(list(terms.values()))
     declared, many = widths == AS_DECLARED, many_parameters(fits)
     # Under other priors the fits' own evidences say only roughly which sizes matter.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from mpam_calib.criticism.data.problem import SIZE_PRIOR, SIZES, Problem
+from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import Fit, chain_for, fit
 from mpam_calib.criticism.fitting.noise_scale import settle_noise
 from mpam_calib.criticism.selection.evidence import SETTLES, log_evidence_beyond_laplace
@@ -64,7 +64,7 @@ class Ranked:
     @property
     def best(self) -> Fit:
         """The fit at the most probable size of the remainder."""
-        return max(self.fits, key=lambda f: f.log_evidence + log(SIZE_PRIOR[f.size]))
+        return max(self.fits, key=lambda f: f.log_share)
 
 
 def rank(problem: Problem, space: Sequence[Simulation], *, workers: int = 2) -> list[Ranked]:
@@ -172,7 +172,7 @@ def fitted(
 
 
 def _ranked(problem: Problem, simulation: Simulation, fits: list[Fit]) -> Ranked:
-    terms = [f.log_evidence + log(SIZE_PRIOR[f.size]) for f in fits]
+    terms = [f.log_share for f in fits]
     n = len(problem)
     reached = [-0.5 * (f.chi2 + problem.log_dets[f.size] + n * log(2.0 * pi)) for f in fits]
     return Ranked(simulation, fits, float(np.logaddexp.reduce(terms)), ceiling=max(reached))

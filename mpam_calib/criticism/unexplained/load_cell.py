@@ -10,13 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations, product
-from math import log
 
 import numpy as np
 
-from mpam_calib.criticism.data.problem import SIZE_PRIOR, SIZES
+from mpam_calib.criticism.data.problem import SIZES
 from mpam_calib.criticism.fitting.fit import Fit
-from mpam_calib.criticism.fitting.refits import Set, Try, best_of, ended
+from mpam_calib.criticism.fitting.refits import Set, Try, best_of, once_more
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.model.effect import effect
 
@@ -60,19 +59,18 @@ def _rival(found: Search, leading: Set, fault: str) -> Rival:
     sets = [frozenset(c) for k in range(most + 1) for c in combinations(sorted(leading), k)]
     keys = list(product(sets, sorted({0, found.best_size(leading)})))
     fits = found.spread(best_of, [(size, _tries(found, s, size, fault), found.doubting) for s, size in keys])
-    by_set: dict[Set, list[tuple[float, Fit]]] = {}
-    for (beside, size), fitted in zip(keys, fits, strict=True):
+    by_set: dict[Set, list[Fit]] = {}
+    for (beside, _), fitted in zip(keys, fits, strict=True):
         if fitted is not None:
-            term = fitted.log_evidence + log(SIZE_PRIOR[size])
-            by_set.setdefault(beside, []).append((term, fitted))
+            by_set.setdefault(beside, []).append(fitted)
     scores = {
-        s: float(np.logaddexp.reduce([term for term, _ in terms])) + found.log_prior(s | {FAULT})
-        for s, terms in by_set.items()
+        s: float(np.logaddexp.reduce([f.log_share for f in fits])) + found.log_prior(s | {FAULT})
+        for s, fits in by_set.items()
     }
     if not scores:
         return NO_RIVAL
     best = max(scores, key=lambda s: scores[s])
-    _, fitted = max(by_set[best], key=lambda term: term[0])
+    fitted = max(by_set[best], key=lambda f: f.log_share)
     # What opens a loop beside a cell that is read late may be no more than how that is reckoned.
     beside = best - BY_DIRECTION if fault == LATE else best
     return Rival(scores[best] - found.score_of_best(leading), beside, fault, fitted)
@@ -82,9 +80,7 @@ def _tries(found: Search, beside: Set, size: int, fault: str) -> list[Try]:
     """Climbs from where the causes beside it ended: for a cell that gives way, from several knees."""
     sizes = (size, *range(len(SIZES)))
     known = next((found.fits[beside, s] for s in sizes if (beside, s) in found.fits), None)
-    forms, start = (
-        (tuple(sorted(beside)), {}) if known is None else (tuple(sorted(known.effects)), ended(known))
-    )
+    [(forms, start)] = [(tuple(sorted(beside)), {})] if known is None else once_more(known)
     if fault != FAULT:
         return [((*forms, fault), start)]
     setting = found.problem.model.setting
