@@ -89,11 +89,9 @@ def integrate_rates(target: Rates, hypothesis: Hypothesis, mode: Mode, seed: int
     log_weight = evaluate(hypothesis, u) - log_q - alone.log_posterior(rates)
     if not effective_share(log_weight) >= ALIKE:
         return None
-    weight = special.softmax(log_weight)
-    mean = weight @ u
-    return Evidence(
+    return Evidence.of_points(
         rounds.log_integral + float(special.logsumexp(log_weight)) - log(COMPLETED),
         float(np.hypot(error, error_of(log_weight))),
-        mean,
-        (u - mean).T @ ((u - mean) * weight[:, None]),
+        u,
+        special.softmax(log_weight),
     )

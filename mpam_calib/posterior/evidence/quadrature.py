@@ -60,6 +60,12 @@ class Evidence(NamedTuple):
         """Whether the randomisations agree well enough for the figure to be used."""
         return bool(np.isfinite(self.value) and self.error <= RELIABLE)
 
+    @classmethod
+    def of_points(cls, value: float, error: float, u: Array, weight: Array) -> Evidence:
+        """With the mean and covariance of points u (n, d) by their weights (n,), which add up to one."""
+        mean = weight @ u
+        return cls(value, error, mean, (u - mean).T @ ((u - mean) * weight[:, None]))
+
 
 def integrate(density: Density, mode: Mode, seed: int = 0) -> Evidence:
     """Evidence of the density around a mode; ``seed`` randomises the rule (dimensions above one)."""
@@ -79,9 +85,9 @@ def integrate(density: Density, mode: Mode, seed: int = 0) -> Evidence:
 
 def _summary(weighted: Weighted) -> Evidence:
     u = weighted.points.reshape(-1, weighted.points.shape[2])
-    weight = special.softmax(weighted.log_weights.ravel())
-    mean = weight @ u
-    return Evidence(*scatter(weighted.log_weights), mean, (u - mean).T @ ((u - mean) * weight[:, None]))
+    return Evidence.of_points(
+        *scatter(weighted.log_weights), u, special.softmax(weighted.log_weights.ravel())
+    )
 
 
 def _line(density: Density, centre: Array, sd: float) -> Evidence:
@@ -102,9 +108,7 @@ def _line(density: Density, centre: Array, sd: float) -> Evidence:
     value = float(special.logsumexp(log_p) + np.log(step * sd))
     coarse = float(special.logsumexp(log_p[::2]) + np.log(2.0 * step * sd))
     weight = np.exp(log_p - special.logsumexp(log_p))
-    u = centre + sd * z[:, None]
-    mean = weight @ u
-    return Evidence(value, abs(value - coarse), mean, (u - mean).T @ ((u - mean) * weight[:, None]))
+    return Evidence.of_points(value, abs(value - coarse), centre + sd * z[:, None], weight)
 
 
 class _Rule:

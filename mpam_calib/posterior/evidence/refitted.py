@@ -63,9 +63,7 @@ def integrate_refitted(density: Density, mode: Mode, seed: int = 0) -> Evidence:
         log_w = log_p - log_q
         value, error = scatter(np.concatenate(rounds[len(rounds) // 2 :]))
         if len(rounds) == ROUNDS or (len(rounds) >= LEAST and error <= ENOUGH):
-            weight = special.softmax(log_w)
-            mean = weight @ u
-            return Evidence(value, error, mean, (u - mean).T @ ((u - mean) * weight[:, None]))
+            return Evidence.of_points(value, error, u, special.softmax(log_w))
         drawn.append(_fitted(u, log_w, log_p, rng))
 
 
