@@ -7,6 +7,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mpam_calib.specimen.recording import ForceMap
+
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -96,6 +98,13 @@ class Readings:
             speed=zero,
             pace=zero,
         )
+
+    @staticmethod
+    def of_map(grid: ForceMap, L0: float) -> Readings:
+        """The rows of a force map (n,) of a muscle of length L0 (m), each on its branch."""
+        sign = np.where(np.abs(grid.branch) == 1, grid.branch, 0).astype(np.float64)
+        rows = Readings.at_rest(grid.pressure_Pa, grid.contraction * L0, sign)
+        return replace(rows, level=grid.level)
 
 
 TIMES = 10.0 ** np.arange(0.0, 4.0, 0.5)

@@ -23,7 +23,7 @@ from mpam_calib.prediction.curves import contraction_grid, first_root
 from mpam_calib.prediction.hidden import checked_sizes, not_shown, with_hidden
 from mpam_calib.prediction.protocol import LEVELS, thesis_protocol
 from mpam_calib.specimen.arguments import demand_specimen, demand_whole
-from mpam_calib.specimen.recording import ForceMap, Loops, Specimen
+from mpam_calib.specimen.recording import Loops, Specimen
 
 Array = NDArray[np.float64]
 
@@ -109,21 +109,25 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
         model, hidden = with_hidden(blueprint, values, hide, specimen)
     else:
         specimen, model, hidden, values, eta = _settled(replace(specimen, levels_Pa=LEVELS), hide)
-    assert model.chain is not None
-    eta = eta[:, : model.linear_sizes[0]]
+    assert model.chain is not None and model.setting is not None
+    eta, scale = eta[:, : model.linear_sizes[0]], model.setting.force_scale
     loops, grid = specimen.loops, specimen.force_map
     floor = specimen.sensors.force_floor_N
     rows = [] if loops is None else [row_readings(loops)]
-    rows += [] if grid is None else [_map_readings(grid, specimen)]
+    if grid is not None:
+        assert specimen.geometry is not None
+        rows.append(Readings.of_map(grid, specimen.geometry.L0))
     unseen = not_shown(model, values, eta, rows, hide, floor)
     if loops is not None:
         force = model.chain.force(values, eta, rows[0])[0]
-        assert model.setting is not None
-        loops = _record(loops, force, values, model.setting.force_scale, floor, rng)
+        dt = float(np.median(np.diff(loops.time_s)))
+        reading, slack = _read(force, dt, values, scale, floor, rng)
+        # Each row has the noise of one reading, whatever the rows stood for that it takes its place from.
+        loops = replace(loops, force_N=reading, censored=slack, averaged=1)
     if grid is not None:
         force = model.chain.force(values, eta, rows[-1])[0]
-        assert model.setting is not None
-        grid = _record_map(grid, force, values, model.setting.force_scale, floor, rng)
+        reading, slack = _read(force, None, values, scale, floor, rng)
+        grid = replace(grid, force_N=reading, censored=slack)
     result = replace(
         specimen,
         loops=loops,
@@ -218,38 +222,15 @@ def _noise(
     return np.asarray(noise)
 
 
-def _record(
-    loops: Loops,
+def _read(
     force: Array,
+    dt: float | None,
     values: dict[str, Array],
     scale: float,
     floor: float | None,
     rng: np.random.Generator,
-) -> Loops:
-    dt = float(np.median(np.diff(loops.time_s)))
+) -> tuple[Array, NDArray[np.bool_]]:
+    """What a load cell makes of forces (n,), N, and which of the readings are slack."""
     held = force if floor is None else np.maximum(force, floor)
     reading = held + _noise(held, dt, values, scale, rng)
-    censored = np.zeros(len(force), dtype=bool) if floor is None else reading <= floor
-    # Each row has the noise of one reading, whatever the rows stood for that it takes its place from.
-    return replace(loops, force_N=reading, censored=censored, averaged=1)
-
-
-def _map_readings(grid: ForceMap, specimen: Specimen) -> Readings:
-    assert specimen.geometry is not None
-    sign = np.where(np.abs(grid.branch) == 1, grid.branch, 0).astype(np.float64)
-    readings = Readings.at_rest(grid.pressure_Pa, grid.contraction * specimen.geometry.L0, sign)
-    return replace(readings, level=grid.level)
-
-
-def _record_map(
-    grid: ForceMap,
-    force: Array,
-    values: dict[str, Array],
-    scale: float,
-    floor: float | None,
-    rng: np.random.Generator,
-) -> ForceMap:
-    held = force if floor is None else np.maximum(force, floor)
-    reading = held + _noise(held, None, values, scale, rng)
-    censored = np.zeros(len(force), dtype=bool) if floor is None else reading <= floor
-    return replace(grid, force_N=reading, censored=censored)
+    return reading, np.zeros(len(force), dtype=bool) if floor is None else reading <= floor

@@ -63,12 +63,9 @@ def gather_points(specimen: Specimen) -> Points | None:
         kind.append(np.full(len(value), which))
 
     if (grid := specimen.force_map) is not None:
-        sign = np.where(np.abs(grid.branch) == 1, grid.branch, 0).astype(np.float64)
-        rows = Readings.at_rest(grid.pressure_Pa, grid.contraction * L0, sign)
-        rows = Readings(**{**rows.__dict__, "level": grid.level})
         curve = np.unique(np.stack([grid.level, grid.branch]), axis=1, return_inverse=True)[1].ravel()
         lifted = lifted_by_noise(grid.force_N, grid.contraction, curve, grid.censored, floor, sd)
-        add(rows, grid.force_N, grid.censored | lifted, 0)
+        add(Readings.of_map(grid, L0), grid.force_N, grid.censored | lifted, 0)
     if (blocked := specimen.blocked_force) is not None:
         rows = Readings.at_rest(blocked.pressure_Pa, np.zeros_like(blocked.pressure_Pa))
         one = np.zeros(len(blocked.force_N), dtype=np.int64)
