@@ -21,6 +21,17 @@ HALF_WAVES = 12
 GRID_POINTS = 32
 
 
+def half_waves(position: Array, count: int) -> Array:
+    """Half-waves over the range 0 to 1 at positions (n,) in it, (n, count), with falling weights.
+
+    A random function of them has a mean square of 1 over the range.
+    """
+    j = np.arange(count)
+    weights = 1.0 / (1.0 + j)
+    weights /= np.sqrt(np.sum(weights**2 * np.where(j > 0, 0.5, 1.0)))
+    return np.asarray(np.cos(np.pi * j * position[:, None]) * weights)
+
+
 @dataclass(frozen=True)
 class TensileModel:
     """σ(ε) = Σ E_k e^k + remainder, on a declared range of engineering strain (low, high).
@@ -50,12 +61,8 @@ class TensileModel:
         return self.stiffness * float(np.sqrt(np.mean(np.linspace(self.low, self.high, GRID_POINTS) ** 2)))
 
     def remainder(self, strain: Array) -> Array:
-        """Half-waves along the strain range for amplitude 1 Pa, (n, HALF_WAVES), falling weights."""
-        j = np.arange(HALF_WAVES)
-        weights = 1.0 / (1.0 + j)
-        weights /= np.sqrt(np.sum(weights**2 * np.where(j > 0, 0.5, 1.0)))
-        position = (strain - self.low) / (self.high - self.low)
-        return np.asarray(np.cos(np.pi * j * position[:, None]) * weights)
+        """Half-waves along the strain range for amplitude 1 Pa, (n, HALF_WAVES)."""
+        return half_waves((strain - self.low) / (self.high - self.low), HALF_WAVES)
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Noise and remainder amplitude, Pa."""

@@ -25,6 +25,7 @@ from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.noise import grown
 from mpam_calib.model.readings import Readings
+from mpam_calib.model.tensile import half_waves
 from mpam_calib.posterior.likelihood.bins import LoopBins, bin_loops
 from mpam_calib.posterior.likelihood.covariance import StrokeCovariance
 from mpam_calib.posterior.likelihood.points import gather_points
@@ -282,21 +283,11 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
         if noise is None:
             guess = model.setting.force_sd or float(np.nan_to_num(force_noise(loops.clear)))
             noise = NoiseLevel(guess or NOISE_UNKNOWN, 0.0, 1.0)
-        layout = StrokeCovariance.build(bins)
-        if noise.reading:
-            layout = replace(layout, dt=np.full_like(layout.dt, noise.reading))
-        white, correlated, time = (np.array([v]) for v in (noise.white, noise.correlated, noise.time))
-        padded = layout.matrix(white, correlated, time, np.zeros(1))[0][layout.kind]
-        full = np.zeros((len(keep), len(keep)))
-        for segment in looked_at:
-            rows = np.flatnonzero(bins.segment[keep] == segment)
-            at = bins.position[keep[rows]]
-            full[np.ix_(rows, rows)] = padded[segment][np.ix_(at, at)]
         larger = grown(np.array(noise.growth), bins.force[keep], scale)
         low, high = bins.readings.take(keep), bins.readings.take(keep + n)
         parts.append((low, high, bins.force[keep], bins.segment[keep]))
         own, shared = _held(bins, keep)
-        blocks.append(larger[:, None] * larger * full + own)
+        blocks.append(larger[:, None] * larger * _noise_of_strokes(bins, keep, noise) + own)
         ties.append(shared)
     points = gather_points(specimen)
     if points is not None:
@@ -336,6 +327,21 @@ def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
     return replace(problem, kernel=_kernel(problem))
 
 
+def _noise_of_strokes(bins: LoopBins, keep: Ints, noise: NoiseLevel) -> Array:
+    """Covariance (n, n), N², of the noise of these bins at small forces: none between two strokes."""
+    layout = StrokeCovariance.build(bins)
+    if noise.reading:
+        layout = replace(layout, dt=np.full_like(layout.dt, noise.reading))
+    white, correlated, time = (np.array([v]) for v in (noise.white, noise.correlated, noise.time))
+    padded = layout.matrix(white, correlated, time, np.zeros(1))[0][layout.kind]
+    full = np.zeros((len(keep), len(keep)))
+    for segment in np.unique(bins.segment[keep]):
+        rows = np.flatnonzero(bins.segment[keep] == segment)
+        at = bins.position[keep[rows]]
+        full[np.ix_(rows, rows)] = padded[segment][np.ix_(at, at)]
+    return full
+
+
 def _held(bins: LoopBins, keep: Ints) -> tuple[Array, Array]:
     """What these bins may be off by at rest: their level's friction, alike in all strokes.
 
@@ -366,11 +372,7 @@ def _kernel(problem: Problem, own_share: float = STROKE_SHARE) -> Array:
     setting = problem.model.setting
     assert setting is not None
     readings = problem.middle()
-    position = readings.displacement / max(setting.stroke, 1e-9)
-    j = np.arange(HALF_WAVES)
-    weights = 1.0 / (1.0 + j)
-    weights /= np.sqrt(np.sum(weights**2 * np.where(j > 0, 0.5, 1.0)))
-    waves = np.cos(np.pi * j * position[:, None]) * weights
+    waves = half_waves(readings.displacement / max(setting.stroke, 1e-9), HALF_WAVES)
     along = waves @ waves.T
     pressure = readings.pressure / setting.top_pressure
     apart = np.exp(-np.abs(pressure[:, None] - pressure) / PRESSURE_LENGTH)
