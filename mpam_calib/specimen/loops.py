@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from mpam_calib.specimen.clock import Clock
 from mpam_calib.specimen.cycles import cycles_at_turns, number_cycles, returns
@@ -77,37 +78,13 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
     averaged = max(1, round(sum(counts) / sum(map(len, frames))))
     clock = np.repeat(np.arange(len(frames)), [len(frame) for frame in frames])
     everywhere = set.intersection(*(set(frame.columns) for frame in frames))
-    notes = [
-        f"loops: {read.repeated} of {read.rows} readings of {read.file.label} have the time of the one "
-        "before; those of a tick are taken as evenly spaced up to the next"
-        for read in clocks
-        if read.coarse
-    ]
-    if averaged > 1:
-        notes.append(f"loops: {sum(counts)} rows were averaged {averaged} at a time while reading")
-    for name in ("setpoint_kPa", "cycle"):
-        without = [file.label for file, frame in zip(files, frames, strict=True) if name not in frame]
-        if without and len(without) < len(files):
-            notes.append(f"loops: {name} is not in {listed(without, 3)} and was not used in the others")
     level, (branch, unclear), filled = _levels_and_motion(frames, clock, "setpoint_kPa" in everywhere)
-    turning = unclear & ~filled
-    if turning.any():
-        notes.append(
-            f"loops: {int(turning.sum())} readings at turns and beside holds are left out: their "
-            "displacement does not tell the branch (a column branch would)"
-        )
-    if filled.any():
-        notes.append(
-            f"loops: {int(filled.sum())} readings at held length are left out: their pressure is on its way, "
-            "or already another than their stroke's (a column branch would tell what they are)"
-        )
     times = [frame["time_s"].to_numpy() for frame in frames]
-    anew = sum(bool(after[0] <= before[-1]) for before, after in pairwise(times))
-    if anew:
-        notes.append(
-            f"loops: the clock begins anew in {anew} of {len(frames)} files; they count as recorded in the "
-            "order given, without a pause"
-        )
+    notes = [
+        *_notes_of_files(files, frames, clocks, averaged),
+        *_notes_of_rows_left_out(unclear & ~filled, filled),
+        *_notes_of_clocks(times),
+    ]
     rows = pd.concat([frame[sorted(everywhere)] for frame in frames], ignore_index=True)
     pressure = rows["pressure_kPa"].to_numpy() * KPA
     apart = len(np.unique(level))
@@ -144,6 +121,51 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
         temperature_C=rows["temperature_C"].to_numpy() if "temperature_C" in everywhere else None,
     )
     return LoopsRead(loops, levels_Pa, tuple(counts), tuple(notes), "setpoint_kPa" in everywhere)
+
+
+def _notes_of_files(
+    files: Sequence[DataFile], frames: Sequence[pd.DataFrame], clocks: Sequence[Clock], averaged: int
+) -> list[str]:
+    """Ticks that were spread, rows that were averaged, and columns that not every file has."""
+    notes = [
+        f"loops: {read.repeated} of {read.rows} readings of {read.file.label} have the time of the one "
+        "before; those of a tick are taken as evenly spaced up to the next"
+        for read in clocks
+        if read.coarse
+    ]
+    if averaged > 1:
+        count = sum(read.rows for read in clocks)
+        notes.append(f"loops: {count} rows were averaged {averaged} at a time while reading")
+    for name in ("setpoint_kPa", "cycle"):
+        without = [file.label for file, frame in zip(files, frames, strict=True) if name not in frame]
+        if without and len(without) < len(files):
+            notes.append(f"loops: {name} is not in {listed(without, 3)} and was not used in the others")
+    return notes
+
+
+def _notes_of_rows_left_out(turning: NDArray[np.bool_], filled: NDArray[np.bool_]) -> list[str]:
+    notes = []
+    if turning.any():
+        notes.append(
+            f"loops: {int(turning.sum())} readings at turns and beside holds are left out: their "
+            "displacement does not tell the branch (a column branch would)"
+        )
+    if filled.any():
+        notes.append(
+            f"loops: {int(filled.sum())} readings at held length are left out: their pressure is on its way, "
+            "or already another than their stroke's (a column branch would tell what they are)"
+        )
+    return notes
+
+
+def _notes_of_clocks(times: Sequence[Floats]) -> list[str]:
+    anew = sum(bool(after[0] <= before[-1]) for before, after in pairwise(times))
+    if not anew:
+        return []
+    return [
+        f"loops: the clock begins anew in {anew} of {len(times)} files; they count as recorded in the "
+        "order given, without a pause"
+    ]
 
 
 def one_after_the_other(times: Sequence[Floats]) -> tuple[Floats, Floats]:
