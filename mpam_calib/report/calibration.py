@@ -21,7 +21,7 @@ from mpam_calib.report.blocks import (
 )
 from mpam_calib.report.figures import corner, loops, pressure, priors, residuals
 from mpam_calib.report.held import held_between
-from mpam_calib.report.numbers import decimals, fixed, significant, with_band
+from mpam_calib.report.numbers import decimals, fixed, row_with_band, significant
 from mpam_calib.report.one_branch import pull_of
 from mpam_calib.report.page import Page
 from mpam_calib.report.parameters import RIGHT, learnt_table, summary_table
@@ -52,7 +52,7 @@ def _lead(view: CalibrationView) -> list[Block]:
     cards: list[KeyNumber] = []
     blocked = view.at_level("blocked_force_N", top)
     if blocked is not None:
-        value, band = _band(blocked)
+        value, band = row_with_band(blocked)
         parts.append(Markup("pulls with ") + spoken(value, band, "N", " when it is held at full length"))
         cards.append(
             KeyNumber(
@@ -95,10 +95,6 @@ def _fit_cards(view: CalibrationView) -> list[KeyNumber]:
     text = f"{100 * held.share:.0f}"
     words = "of readings at a pressure level that the fit had not seen fell in its bands"
     return [KeyNumber("Levels left out", text, "%", words, "should be 90 %")]
-
-
-def _band(row: pd.Series) -> tuple[str, str]:
-    return with_band(*(float(row[q]) for q in ("mean", "q05", "q95", "q50")))
 
 
 def _sections(view: CalibrationView) -> list[Section]:
@@ -203,7 +199,7 @@ def _level_row(view: CalibrationView, level: float) -> dict[str, str]:
     blocked, free = view.at_level("blocked_force_N", level), view.at_level("free_contraction", level)
     row = {"pressure (kPa)": f"{level:.4g}"}
     for name, cells in (
-        ("blocked force (N)", None if blocked is None else _band(blocked)),
+        ("blocked force (N)", None if blocked is None else row_with_band(blocked)),
         ("free contraction (%)", None if free is None else contraction_band(view, free)),
     ):
         mean, band = cells or ("–", "–")

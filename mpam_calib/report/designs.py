@@ -30,7 +30,7 @@ from mpam_calib.report.blocks import (
 from mpam_calib.report.design_bounds import beyond_bounds, within
 from mpam_calib.report.designs_table import contraction_band, designs_of, mean_band, same_design
 from mpam_calib.report.figures import designs as figure
-from mpam_calib.report.numbers import fixed, significant, with_band
+from mpam_calib.report.numbers import fixed, row_with_band, significant
 from mpam_calib.report.page import Page
 from mpam_calib.report.spoken import spoken
 from mpam_calib.units import DEG, KPA, MM
@@ -86,7 +86,7 @@ class DesignsView:
         if not here.any():
             return None
         row = rows[here].iloc[0]
-        return with_band(float(row["mean"]), float(row["q05"]), float(row["q95"]), float(row["q50"]))
+        return row_with_band(row)
 
     @property
     def levels(self) -> Array:

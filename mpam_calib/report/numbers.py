@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+import pandas as pd
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LARGE, SMALL = 1e5, 1e-3
@@ -63,6 +67,11 @@ def with_band(mean: float, low: float, high: float, median: float | None = None)
         return f"{significant(mean, 2)} (mean, outside the band)", band
     text = f"{fixed(scale * value, n)}{ten_to(power) if power else ''}"
     return f"{text} (median)" if outside else text, band
+
+
+def row_with_band(row: pd.Series | Mapping[Hashable, Any], factor: float = 1.0) -> tuple[str, str]:
+    """:func:`with_band` of a row of ``summary.csv`` or ``bands.csv``, times a factor."""
+    return with_band(*(factor * float(row[q]) for q in ("mean", "q05", "q95", "q50")))
 
 
 def with_open_end(mean: float, low: float, end: float, median: float) -> tuple[str, str]:

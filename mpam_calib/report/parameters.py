@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from mpam_calib.report.numbers import fixed, significant, with_band
+from mpam_calib.report.numbers import fixed, row_with_band, significant
 from mpam_calib.report.trust import LITTLE, UNIDENTIFIED, WIDE_BAD
 from mpam_calib.report.view import CalibrationView
 
@@ -23,7 +23,7 @@ def summary_table(view: CalibrationView, names: list[str] | None = None) -> pd.D
         frame = frame.sort_values("parameter", key=lambda column: column.map(order), kind="stable")
     rows = []
     for row in frame.to_dict("records"):
-        mean, band = with_band(float(row["mean"]), float(row["q05"]), float(row["q95"]), float(row["q50"]))
+        mean, band = row_with_band(row)
         unit = row["unit"] if isinstance(row["unit"], str) else ""
         rows.append(
             {
@@ -48,7 +48,6 @@ def learnt_table(view: CalibrationView) -> pd.DataFrame:
     rows = []
     for row in view.unidentified.sort_values("contraction", kind="stable").to_dict("records"):
         learnt = float(row["contraction"])
-        sentence = row.get("sentence")
         q05, q95 = bands.loc[row["parameter"]] if row["parameter"] in bands.index else (1.0, 1.0)
         rows.append(
             {
@@ -56,9 +55,7 @@ def learnt_table(view: CalibrationView) -> pd.DataFrame:
                 "prior sd": significant(float(row["prior_sd"]), 2),
                 "sd": significant(float(row["posterior_sd"]), 2),
                 "learnt": f"{100 * max(learnt, 0.0):.0f} %",
-                "what that means": sentence
-                if isinstance(sentence, str) and sentence
-                else _sentence(learnt, float(q05), float(q95)),
+                "what that means": _sentence(learnt, float(q05), float(q95)),
             }
         )
     return pd.DataFrame(rows)

@@ -21,7 +21,7 @@ from mpam_calib.report.blocks import (
 from mpam_calib.report.figures import residuals, strain_range
 from mpam_calib.report.figures import tensile as stress_strain
 from mpam_calib.report.headline import first_modulus, stresses
-from mpam_calib.report.numbers import with_band
+from mpam_calib.report.numbers import row_with_band, with_band
 from mpam_calib.report.spoken import spoken
 from mpam_calib.report.trust import assess
 from mpam_calib.report.view import CalibrationView
@@ -31,12 +31,12 @@ def tensile_lead(view: CalibrationView) -> list[Block]:
     """First screen: the stress at two strains, the first modulus, and whether to trust them."""
     cards, parts = [], []
     for row in stresses(view):
-        value, band = with_band(*(1e-3 * float(row[q]) for q in ("mean", "q05", "q95", "q50")))
+        value, band = row_with_band(row, 1e-3)
         strain = f"{row['contraction']:.3g}"
         parts.append(spoken(value, band, "kPa", f" at a strain of {strain}"))
         cards.append(KeyNumber(f"Stress at strain {strain}", value, "kPa", f"90 % band: {band} kPa"))
     if (first := first_modulus(view)) is not None:
-        value, band = with_band(*(1e-3 * float(first[q]) for q in ("mean", "q05", "q95", "q50")))
+        value, band = row_with_band(first, 1e-3)
         engineering = view.simulation.strain == "engineering"
         hint = "slope at small strain" if engineering else "a coefficient in the stretch, not a slope"
         cards.append(KeyNumber("First modulus E_1", value, "kPa", f"90 % band: {band} kPa", hint))

@@ -86,7 +86,7 @@ class CalibrationView:
     the curves behind the bands were looked at; ``unsettled_moduli`` whether the moduli come from a run that
     did not converge, ``early_roots`` the share of draws whose force is gone well short of a measured free
     contraction. ``unidentified`` has ``parameter, prior_sd,
-    posterior_sd, contraction`` (1 − 90 % band of the posterior over that of the prior) ``, sentence``.
+    posterior_sd, contraction`` (1 − 90 % band of the posterior over that of the prior).
     ``left_out`` has a row for each level that was predicted from the others: ``pressure_kPa, readings,
     rmse_N, bias_N, bias_sd_N, inside90, extrapolated``.
 

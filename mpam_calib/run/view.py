@@ -134,7 +134,6 @@ def _learnt(
             "prior_sd": summary["prior_sd"],
             "posterior_sd": summary["sd"],
             "contraction": 1.0 - ratio,
-            "sentence": "",
         }
     )
 

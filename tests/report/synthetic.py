@@ -71,7 +71,6 @@ def unidentified_of(summary: pd.DataFrame) -> pd.DataFrame:
             "prior_sd": summary["prior_sd"],
             "posterior_sd": summary["sd"],
             "contraction": 1 - summary["sd"] / summary["prior_sd"],
-            "sentence": "",
         }
     )
 
