@@ -39,10 +39,11 @@ def simulate(
     from mpam_calib.prediction.simulate import simulate as make
     from mpam_calib.run.synthetic import demand_synthetic_folder, write_specimen
     from mpam_calib.specimen import read
+    from mpam_calib.specimen.toml_source import SPECIMEN_FILE, declaration_of
 
     if more and not hide:
         raise InputError("simulate", f'"{more[0]}"', "one specimen")
-    source = specimen / "specimen.toml" if specimen.is_dir() else specimen
+    source = declaration_of(specimen)
     if output.resolve() == source.parent.resolve():
         raise InputError(output, "the specimen's own folder", "another folder")
     demand_synthetic_folder(output)
@@ -54,7 +55,7 @@ def simulate(
     left = [file.name for file in real.files if file.kind in ("blocked_force", "free_contraction")]
     if left:
         print(f"not simulated: {', '.join(left)}")
-    print(output / "specimen.toml")
+    print(output / SPECIMEN_FILE)
 
 
 def _sizes(hide: list[str]) -> dict[str, float | None]:

@@ -21,7 +21,7 @@ from mpam_calib.run.provenance import provenance
 from mpam_calib.run.replaced import tell_replaced
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
-from mpam_calib.specimen.toml_source import SPECIMEN_FILE
+from mpam_calib.specimen.toml_source import SPECIMEN_FILE, declaration_of
 
 EXTENDED = "extended"
 FILES = ("diagnosis.json", "report.html", f"{EXTENDED}/{SPECIMEN_FILE}")
@@ -50,8 +50,7 @@ def diagnose_to_folder(
     with kept.unfinished.resumable():
         found = diagnose(specimen, material=material, tell=tell, journal=Journal(kept.unfinished))
     kept.begin()
-    toml = source / SPECIMEN_FILE if source.is_dir() else source
-    write_extended(found, specimen, toml, run / EXTENDED)
+    write_extended(found, specimen, declaration_of(source), run / EXTENDED)
     content = describe(found, seed)
     diagnosis_page(found, content, specimen).under(provenance(specimen)).write(run / "report.html")
     write_json(content, run / "diagnosis.json")
@@ -62,8 +61,7 @@ def diagnose_to_folder(
 def _demand_extended(source: Path, run: Path, files: tuple[str, ...]) -> None:
     """Raise ``InputError`` where the extended specimen would be written over another, or its own source."""
     extended = run / EXTENDED
-    folder = source if source.is_dir() else source.parent
-    if folder.resolve().is_relative_to(extended.resolve()):
+    if declaration_of(source).parent.resolve().is_relative_to(extended.resolve()):
         raise InputError(run, f"the folder whose {EXTENDED}/ is diagnosed", "another for these results")
     own = any((run / name).exists() for name in (KEPT_FILE, UNFINISHED))
     others = any((run / name).exists() for name in files if name.startswith(f"{EXTENDED}/"))

@@ -50,12 +50,17 @@ class TomlSource:
         return found
 
 
+def declaration_of(path: Path) -> Path:
+    """The declaration that is meant by a specimen's folder, or by the file itself."""
+    return path / SPECIMEN_FILE if path.is_dir() else path
+
+
 def read_toml(path: Path) -> TomlSource:
     """Read a declaration; ``path`` is the specimen's folder or the file itself.
 
     Raises ``InputError`` where it is missing, is not UTF-8 text, or breaks TOML's rules.
     """
-    file = path / SPECIMEN_FILE if path.is_dir() else path
+    file = declaration_of(path)
     expected = f"a specimen folder with its {SPECIMEN_FILE}"
     if file.is_file() and file.suffix.lower() == ".csv":
         raise InputError(file, "a data file", expected)
