@@ -168,6 +168,6 @@ def mean_force(muscle: MuscleDraws, P: float) -> Function:
     return lambda x: np.asarray(muscle.blocked_forces(P, x).mean(axis=-1))
 
 
-def quantile_force(muscle: MuscleDraws, P: float, q: float = 0.05) -> Function:
-    """A quantile of the blocked force at P (Pa) as an objective (N): what can be relied on."""
-    return lambda x: np.asarray(np.quantile(muscle.blocked_forces(P, x), q, axis=-1))
+def quantile_force(muscle: MuscleDraws, P: float) -> Function:
+    """The 5 % quantile of the blocked force at P (Pa) as an objective (N): what can be relied on."""
+    return lambda x: np.asarray(np.quantile(muscle.blocked_forces(P, x), 0.05, axis=-1))

@@ -91,11 +91,11 @@ WALL = (R, T, ALPHA)
 BRAIDED = (R, T, ALPHA, R_BR, N)
 
 
-def ratio_constraints(low: float = RATIO_LOW, high: float = RATIO_HIGH) -> tuple[Constraint, ...]:
+def ratio_constraints(low: float = RATIO_LOW) -> tuple[Constraint, ...]:
     """The two constraints on V_bl/V of Eq. 3.15; designs start with R and t."""
     return (
         Constraint("V_bl/V >= low", lambda x: volume_ratio(x[..., 0], x[..., 1]) - low),
-        Constraint("V_bl/V <= high", lambda x: high - volume_ratio(x[..., 0], x[..., 1])),
+        Constraint("V_bl/V <= high", lambda x: RATIO_HIGH - volume_ratio(x[..., 0], x[..., 1])),
     )
 
 
@@ -115,10 +115,8 @@ def case_two(P: float, ratio_low: float = RATIO_LOW, objective: Function | None 
 
 def case_one(
     P: float,
-    ratio_low: float = RATIO_LOW,
     packing: bool = False,
     strand_radius: float | None = None,
-    E_br: float = E_BR,
     objective: Function | None = None,
 ) -> Problem:
     """Case I (Eq. 3.12, 3.15) at pressure P (Pa): R, t, α, R_br, n.
@@ -129,10 +127,10 @@ def case_one(
 
     def force(x: Array) -> Array:
         p = np.asarray(P)
-        loss = braid_loss(p, x[..., 0], x[..., 2], x[..., 3], x[..., 4], E_br)
+        loss = braid_loss(p, x[..., 0], x[..., 2], x[..., 3], x[..., 4], E_BR)
         return blocked_force(p, x[..., 0], x[..., 1], x[..., 2]) - loss
 
-    constraints = ratio_constraints(ratio_low) + ((packing_constraint(),) if packing else ())
+    constraints = ratio_constraints() + ((packing_constraint(),) if packing else ())
     variables = BRAIDED
     if strand_radius is not None:
         variables = (*WALL, Variable("R_br", "mm", R_BR.lower, strand_radius, MM), N)

@@ -86,7 +86,7 @@ class _Counted:
         return self._function(u)
 
 
-def evolve(problem: Problem, seed: int, generations: int = GENERATIONS) -> Stage:
+def evolve(problem: Problem, seed: int, generations: int) -> Stage:
     """Global search by differential evolution from a random population."""
     objective = _Counted(problem)
     history: list[float] = []
@@ -149,12 +149,7 @@ def refine(problem: Problem, start: Array, method: Local, iterations: int = ITER
         if best is None or stage.value > best.value:
             best = stage
     assert best is not None
-    return replace(
-        best,
-        iterations=relaxed.iterations,
-        evaluations=evaluations,
-        history=relaxed.history,
-    )
+    return replace(best, iterations=relaxed.iterations, evaluations=evaluations, history=relaxed.history)
 
 
 def _local(problem: Problem, start: Array, method: Local, fixed: dict[int, float], iterations: int) -> Stage:

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 KEPT = 1000
 """Draws kept of each ensemble."""
+PRIOR = 2000
+"""Draws of the prior that its widths are told by."""
 
 
 def kept_for(ess_wanted: float) -> int:
@@ -163,10 +165,11 @@ def _rate(model: Model, draws: Draws, name: str) -> Reported:
     )
 
 
-def _prior(model: Model, seed: int, count: int = 2000) -> tuple[Array, Array]:
+def _prior(model: Model, seed: int) -> tuple[Array, Array]:
+    """PRIOR draws of the prior: u (PRIOR, d) and the moduli's coordinates (PRIOR, p)."""
     rng = np.random.default_rng([seed, 2])
-    u = rng.standard_normal((count, len(model.names)))
-    eta = rng.standard_normal((count, model.linear_sizes[0]))
+    u = rng.standard_normal((PRIOR, len(model.names)))
+    eta = rng.standard_normal((PRIOR, model.linear_sizes[0]))
     sampled = model.moduli_of(model.values(u))
     return u, eta if sampled is None else sampled
 

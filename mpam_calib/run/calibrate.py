@@ -93,9 +93,8 @@ def calibrate_to_folder(
             listener=_told_first(run, specimen, source, tell),
         )
     figures = calibration.sampling.diagnostics
-    ess = float(min(figures.ess_bulk.min(), figures.ess_tail.min()))
     steps = calibration.sampling.chain.shape[1]
-    tell(Progress("reporting", steps, float(figures.rhat.max()), ess, 1.0))
+    tell(Progress("reporting", steps, float(figures.rhat.max()), figures.ess_min, 1.0))
     from mpam_calib.report.calibration import calibration_page
     from mpam_calib.run.view import view_of
 

@@ -30,6 +30,11 @@ class Diagnostics:
         """Whether the default limits are met."""
         return self.meets(ESS_WANTED)
 
+    @property
+    def ess_min(self) -> float:
+        """The smallest ESS of any parameter, bulk or tail."""
+        return float(min(self.ess_bulk.min(), self.ess_tail.min()))
+
     def meets(self, ess_wanted: float) -> bool:
         """R-hat within its limit and both ESS at least ``ess_wanted`` for every parameter."""
         return bool(

@@ -130,7 +130,7 @@ def sample(
                 continue
             chain = np.concatenate([np.stack([b.chain for b in part]) for part in blocks], axis=1)
             figures = diagnose_chains(chain)
-            ess = float(min(figures.ess_bulk.min(), figures.ess_tail.min()))
+            ess = figures.ess_min
             in_time = steps >= due and size == BLOCK
             due = round(steps * min(max(PATIENCE[0], ess_wanted / ess), PATIENCE[1]))
             tell(Progress("sampling", steps, float(figures.rhat.max()), ess, min(ess / ess_wanted, 1.0)))

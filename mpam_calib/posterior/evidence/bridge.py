@@ -40,12 +40,12 @@ class Bridge(NamedTuple):
         return bool(np.isfinite(self.value) and self.error <= RELIABLE)
 
 
-def bridge_evidence(density: Density, found: Evidence, seed: int, draws: int = DRAWS) -> Bridge:
+def bridge_evidence(density: Density, found: Evidence, seed: int) -> Bridge:
     """Bridge sampling of a density whose mean and covariance are about known."""
     if len(found.mean) == 0:
         return Bridge(found.value, 0.0)
-    first = _bridge_once(density, found, seed, draws)
-    return first if first.reliable else _bridge_once(density, found, seed, MORE * draws)
+    first = _bridge_once(density, found, seed, DRAWS)
+    return first if first.reliable else _bridge_once(density, found, seed, MORE * DRAWS)
 
 
 def _bridge_once(density: Density, found: Evidence, seed: int, draws: int) -> Bridge:
