@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import pytest
 
+from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.data.rows import Rows
 
-from .test_hypotheses import problem_of, specimen_of
+from .test_hypotheses import null_recipe, problem_of, specimen_of
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    """A muscle in which nothing is hidden."""
+    return problem_of(specimen_of(null_recipe().name))
 
 
 @pytest.fixture(scope="module", params=["develop-null-001", "develop-null-003", "develop-null-004"])

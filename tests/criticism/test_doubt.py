@@ -21,12 +21,6 @@ EACH = 60
 """Tests made for every doubt."""
 
 
-@pytest.fixture(scope="module")
-def problem() -> Problem:
-    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
-    return problem_of(specimen_of(recipe.name))
-
-
 def share(problem: Problem) -> np.ndarray:
     """What the cause does to the force of the fitted simulation (n,), N."""
     start = fit(problem, frozenset(), 0)

@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from rig import sets
 
-from criticism.test_hypotheses import problem_of, specimen_of
+from criticism.test_hypotheses import null_recipe, problem_of, specimen_of
 from criticism.test_sizes import force_with
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import Fit, fit
@@ -36,8 +35,7 @@ CURVED_SIZES = {"droop_percent": 1.0, "droop_steepness": -0.4, "tip_factor": 0.5
 
 def hiding(causes: frozenset[str], sizes: dict[str, float]) -> Problem:
     """Both causes hidden in a case that hides nothing else."""
-    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
-    bare = problem_of(specimen_of(recipe.name))
+    bare = problem_of(specimen_of(null_recipe().name))
     start = fit(bare, frozenset(), 0)
     change = force_with(bare, start, "+".join(causes), sizes) - start.force
     return bare.with_force(bare.force + change)

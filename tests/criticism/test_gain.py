@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rig import sets
 
-from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism import gain as gain_module
 from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import Fit, fit
@@ -21,12 +19,6 @@ from mpam_calib.criticism.gain import Z90, _Fold, measure_gain
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.tasks.spread import Alone
 from mpam_calib.specimen.declaration import Simulation
-
-
-@pytest.fixture(scope="module")
-def null_problem() -> Problem:
-    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
-    return problem_of(specimen_of(recipe.name))
 
 
 def covered(problem: Problem, size: int) -> float:
@@ -41,22 +33,22 @@ def covered(problem: Problem, size: int) -> float:
 
 
 @pytest.mark.parametrize("share", [0.1, 0.3])
-def test_bands_hold_a_misfit_that_no_remainder_holds(null_problem: Problem, share: float) -> None:
+def test_bands_hold_a_misfit_that_no_remainder_holds(problem: Problem, share: float) -> None:
     """Every level is off by a curve of its own, 10 or 30 % of the force scale: the search stops at 3 %."""
     rng = np.random.default_rng(5)
-    x = null_problem.middle().displacement / null_problem.middle().displacement.max()
+    x = problem.middle().displacement / problem.middle().displacement.max()
     waves = np.cos(np.pi * np.arange(4) * x[:, None])
-    amplitudes = rng.standard_normal((null_problem.level.max() + 1, 4)) / 2.0
-    off = share * null_problem.force_scale * np.sum(amplitudes[null_problem.level] * waves, axis=1)
-    wrong = replace(null_problem, force=null_problem.force + off)
+    amplitudes = rng.standard_normal((problem.level.max() + 1, 4)) / 2.0
+    off = share * problem.force_scale * np.sum(amplitudes[problem.level] * waves, axis=1)
+    wrong = replace(problem, force=problem.force + off)
     assert 0.8 <= covered(wrong, len(SIZES) - 1) <= 0.99
 
 
-def test_named_causes_are_refitted_in_the_forms_that_were_named(null_problem: Problem) -> None:
+def test_named_causes_are_refitted_in_the_forms_that_were_named(problem: Problem) -> None:
     """Whatever forms a fold's search likes better: what tells them apart may be the very rows left out."""
     causes = frozenset(["creep"])
-    relaxing = null_problem.force * (1.0 - 0.03 * np.log10(1.0 + null_problem.middle().time_at_level))
-    problem = replace(null_problem, force=relaxing)
+    relaxing = problem.force * (1.0 - 0.03 * np.log10(1.0 + problem.middle().time_at_level))
+    problem = replace(problem, force=relaxing)
     plain, bent = (fit(problem, frozenset([form]), 0) for form in ("creep", "creep:wall-bent"))
     assert plain.log_evidence > bent.log_evidence + 10.0
     for known, before in ((plain, bent), (bent, plain)):
@@ -67,9 +59,9 @@ def test_named_causes_are_refitted_in_the_forms_that_were_named(null_problem: Pr
         assert found.fits == {(causes, 0): before}
 
 
-def test_of_two_levels_cycles_are_left_out(null_problem: Problem) -> None:
+def test_of_two_levels_cycles_are_left_out(problem: Problem) -> None:
     """Or nothing is, where there are two cycles as well. No offset is hidden: to name one gains nothing."""
-    problem = null_problem.take(null_problem.level < 2)
+    problem = problem.take(problem.level < 2)
     softer = problem.force + 0.05 * problem.force_scale * problem.middle().displacement / 1e-2
     problem = replace(problem, force=softer)
     tested = ("length_offset", "wall_pressure")
@@ -82,19 +74,19 @@ def test_of_two_levels_cycles_are_left_out(null_problem: Problem) -> None:
     assert measure_gain(problem.take(problem.cycle <= 2), tested, named) is None
 
 
-def test_bands_are_no_wider_than_they_need_be(null_problem: Problem) -> None:
-    assert covered(null_problem, 0) == pytest.approx(0.9, abs=0.06)
+def test_bands_are_no_wider_than_they_need_be(problem: Problem) -> None:
+    assert covered(problem, 0) == pytest.approx(0.9, abs=0.06)
 
 
 @pytest.mark.parametrize("own", [{"law": "free", "moduli": "loops"}, {"friction_by_pressure": True}])
 def test_of_what_each_level_has_of_its_own_cycles_are_left_out(
-    null_problem: Problem, own: dict[str, object]
+    problem: Problem, own: dict[str, object]
 ) -> None:
     """Another level's moduli or friction say nothing of a level left out: its prior alone would be scored."""
-    declared = null_problem.blueprint.simulation.model_dump() | {"friction": "coulomb"} | own
-    simulation = type(null_problem.blueprint.simulation)(**declared)
-    blueprint = null_problem.blueprint.model_copy(update={"simulation": simulation})
-    problem = replace(null_problem, blueprint=blueprint)
+    declared = problem.blueprint.simulation.model_dump() | {"friction": "coulomb"} | own
+    simulation = type(problem.blueprint.simulation)(**declared)
+    blueprint = problem.blueprint.model_copy(update={"simulation": simulation})
+    problem = replace(problem, blueprint=blueprint)
     named = fit(problem, frozenset({"length_offset"}), 0)
     gain = measure_gain(problem, ("length_offset",), named)
     assert gain is not None

@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from rig import sets
 from scipy import stats
 
-from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.fitting.folds import folds_of
@@ -20,12 +18,6 @@ from mpam_calib.criticism.selection.ranking import Ranked
 from mpam_calib.specimen.declaration import Simulation
 
 Predicted = tuple[np.ndarray, np.ndarray]
-
-
-@pytest.fixture(scope="module")
-def problem() -> Problem:
-    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
-    return problem_of(specimen_of(recipe.name))
 
 
 @pytest.fixture(scope="module")

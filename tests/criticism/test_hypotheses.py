@@ -31,92 +31,91 @@ def specimen_of(name: str, which: str = "develop") -> Specimen:
     return read(folder / "specimen")
 
 
+def null_recipe() -> recipes.Recipe:
+    """A muscle with tensile moduli in which nothing is hidden."""
+    return next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
+
+
 def problem_of(specimen: Specimen) -> Problem:
     return build_problem(specimen, draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
 
 
-@pytest.fixture(scope="module")
-def null_problem() -> Problem:
-    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
-    return problem_of(specimen_of(recipe.name))
-
-
-def test_one_place_and_the_row_s_bow_are_enough(null_problem: Problem) -> None:
+def test_one_place_and_the_row_s_bow_are_enough(problem: Problem) -> None:
     """With quite another muscle's curvature the mean over every row is right to a fifth of its noise."""
-    chain = null_problem.model.chain
+    chain = problem.model.chain
     assert chain is not None
-    n = len(null_problem)
-    readings, first, second = null_problem.lean
+    n = len(problem)
+    readings, first, second = problem.lean
     assert len(readings) < 2 * n
     for u, limit in ((0.0, 0.05), (1.0, 0.2)):
         values = {p.name: p.prior.from_normal(np.full((1, 1), u)) for p in chain.parameters}
         eta = np.full((1, chain.linear_size), u)
-        both = chain.force(values, eta, null_problem.readings)[0]
+        both = chain.force(values, eta, problem.readings)[0]
         lean = chain.force(values, eta, readings)[0]
-        difference = 0.5 * (lean[first] + lean[second]) + null_problem.bow - 0.5 * (both[:n] + both[n:])
-        assert np.max(np.abs(difference) / np.sqrt(np.diagonal(null_problem.noise))) < limit
+        difference = 0.5 * (lean[first] + lean[second]) + problem.bow - 0.5 * (both[:n] + both[n:])
+        assert np.max(np.abs(difference) / np.sqrt(np.diagonal(problem.noise))) < limit
 
 
 @pytest.mark.parametrize("size", range(len(SIZES)))
-def test_evidence_of_a_linear_hypothesis_is_exact(null_problem: Problem, size: int) -> None:
+def test_evidence_of_a_linear_hypothesis_is_exact(problem: Problem, size: int) -> None:
     """Without friction the force is linear in the moduli's one factor: a Gaussian marginal in closed form."""
-    simulation = null_problem.blueprint.simulation.model_copy(update={"friction": "none"})
-    blueprint = null_problem.blueprint.model_copy(update={"simulation": simulation})
-    found = fit(null_problem, frozenset(), size, None, blueprint)
+    simulation = problem.blueprint.simulation.model_copy(update={"friction": "none"})
+    blueprint = problem.blueprint.model_copy(update={"simulation": simulation})
+    found = fit(problem, frozenset(), size, None, blueprint)
     setting = blueprint.setting()
     assert setting is not None
     from mpam_calib.model.model import build_model
 
     chain = build_model(blueprint).chain
     assert chain is not None
-    readings, first, second = null_problem.lean
+    readings, first, second = problem.lean
     terms = chain.terms({"": np.zeros((1, 1))}, readings)
-    fixed = 0.5 * (terms.fixed[0, first] + terms.fixed[0, second]) + null_problem.bow
+    fixed = 0.5 * (terms.fixed[0, first] + terms.fixed[0, second]) + problem.bow
     columns = 0.5 * (terms.columns[0, first] + terms.columns[0, second])
-    covariance = null_problem.covariance(SIZES[size]) + columns @ columns.T
-    exact = stats.multivariate_normal.logpdf(null_problem.force, fixed, covariance, allow_singular=False)
+    covariance = problem.covariance(SIZES[size]) + columns @ columns.T
+    exact = stats.multivariate_normal.logpdf(problem.force, fixed, covariance, allow_singular=False)
     assert found.log_evidence == pytest.approx(exact, abs=1e-5)
 
 
-def test_forms_are_silent_at_size_zero(null_problem: Problem) -> None:
-    setting = null_problem.model.setting
+def test_forms_are_silent_at_size_zero(problem: Problem) -> None:
+    setting = problem.model.setting
     assert setting is not None
-    base = null_problem.model.chain
+    base = problem.model.chain
     assert base is not None
     values = {p.name: p.prior.from_normal(np.zeros((1, 1))) for p in base.parameters}
     eta = np.zeros((1, base.linear_size))
-    expected = base.force(values, eta, null_problem.readings)
+    expected = base.force(values, eta, problem.readings)
     seen = 0
     for identifier in known_effects():
         item = effect(identifier)
         if identifier in ("braid_kinematics", "coulomb_friction") or (
-            item.needs_braid and null_problem.blueprint.braid is None
+            item.needs_braid and problem.blueprint.braid is None
         ):
             continue
         for form in (identifier, *(f"{identifier}:{name}" for name in item.all_forms)):
-            simulation = null_problem.blueprint.simulation.model_copy(update={"effects": (form,)})
-            blueprint = null_problem.blueprint.model_copy(update={"simulation": simulation})
+            simulation = problem.blueprint.simulation.model_copy(update={"effects": (form,)})
+            blueprint = problem.blueprint.model_copy(update={"simulation": simulation})
             changed = blueprint.setting()
             assert changed is not None
             zero = {p.name: np.full((1, 1), 1e-12) for p in effect(form).parameters(changed)}
-            force = Chain(changed, base.moduli, False).force(values | zero, eta, null_problem.readings)
+            force = Chain(changed, base.moduli, False).force(values | zero, eta, problem.readings)
             np.testing.assert_allclose(force, expected, atol=1e-6, err_msg=form)
             seen += 1
     assert seen >= 30
 
 
-def test_what_cannot_be_tested_is_said(null_problem: Problem) -> None:
-    slow = null_problem.take(null_problem.cycle == 1)
+def test_what_cannot_be_tested_is_said(problem: Problem) -> None:
+    slow = problem.take(problem.cycle == 1)
     left = dict(candidates(slow).not_tested)
     assert left["stress_softening"] == "one cycle"
-    everything = candidates(null_problem)
+    everything = candidates(problem)
     assert not set(everything.tested) & set(dict(everything.not_tested))
-    assert f"{null_problem.blueprint.simulation.friction}_friction" not in everything.tested
+    assert f"{problem.blueprint.simulation.friction}_friction" not in everything.tested
 
 
-def test_static_points_know_no_way_since_a_turn(null_problem: Problem) -> None:
+def test_static_points_know_no_way_since_a_turn(problem: Problem) -> None:
     """They may have branches, which friction shows in."""
-    still = replace(null_problem, stroke=np.full_like(null_problem.stroke, -1))
+    still = replace(problem, stroke=np.full_like(problem.stroke, -1))
     assert dict(candidates(still).not_tested)["presliding"] == "no loops with both branches"
     other = {"coulomb": "strand_friction", "strand": "coulomb_friction", "none": "coulomb_friction"}
     assert other[still.blueprint.simulation.friction] in candidates(still).tested
@@ -145,20 +144,19 @@ def test_a_force_that_depends_on_itself_is_linearised_as_it_moves() -> None:
     np.testing.assert_allclose(J[:, d : d + p], exact, atol=2e-3 * np.abs(exact).max())
 
 
-def test_friction_that_is_itself_a_cause_may_turn_over_or_depend_on_speed(null_problem: Problem) -> None:
+def test_friction_that_is_itself_a_cause_may_turn_over_or_depend_on_speed(problem: Problem) -> None:
     """Where no friction is declared the one that is found may have every property of one that is."""
-    simulation = null_problem.blueprint.simulation.model_copy(update={"friction": "none"})
-    blueprint = null_problem.blueprint.model_copy(update={"simulation": simulation})
-    tested = candidates(replace(null_problem, blueprint=blueprint)).tested
+    simulation = problem.blueprint.simulation.model_copy(update={"friction": "none"})
+    blueprint = problem.blueprint.model_copy(update={"simulation": simulation})
+    tested = candidates(replace(problem, blueprint=blueprint)).tested
     assert {"coulomb_friction", "presliding"} <= set(tested)
-    assert ("rate_friction" in tested) == ("rate_friction" in candidates(null_problem).tested)
+    assert ("rate_friction" in tested) == ("rate_friction" in candidates(problem).tested)
 
 
-def test_noise_is_found_before_any_model(null_problem: Problem) -> None:
-    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
-    truth = recipes.build_case(recipe).protocol
+def test_noise_is_found_before_any_model(problem: Problem) -> None:
+    truth = recipes.build_case(null_recipe()).protocol
     total = float(np.hypot(truth.noise_N, truth.correlated_N))
-    assert null_problem.noise_level.total == pytest.approx(total, rel=0.3)
+    assert problem.noise_level.total == pytest.approx(total, rel=0.3)
 
 
 DATASETS = Path(__file__).parents[2] / "datasets"
@@ -194,28 +192,28 @@ def test_a_fit_does_not_stay_where_the_force_has_another_sign() -> None:
     assert fit(fold, causes, 0).log_evidence == pytest.approx(near.log_evidence, abs=0.05)
 
 
-def test_a_law_far_from_the_declared_one_is_reached(null_problem: Problem) -> None:
+def test_a_law_far_from_the_declared_one_is_reached(problem: Problem) -> None:
     """Its parameters are sizes, not bends of one: they go as far as any size."""
     effects = frozenset({"law_shape"})
-    chain = chain_for(null_problem.blueprint.model_dump_json(), effects)
+    chain = chain_for(problem.blueprint.model_dump_json(), effects)
     names = [p.name for p in chain.parameters]
     assert [is_bend(n) for n in ("law_bend_1", "law_bend_1_bend_2", "offset_mm_bend_1")] == [
         False,
         True,
         True,
     ]
-    u, n = np.zeros(len(names)), len(null_problem)
+    u, n = np.zeros(len(names)), len(problem)
     first = next(i for i, name in enumerate(names) if name.startswith("law_bend"))
     u[first] = 3.5
     values = {p.name: p.prior.from_normal(np.full((1, 1), u[i])) for i, p in enumerate(chain.parameters)}
-    both = chain.force(values, np.zeros((1, chain.linear_size)), null_problem.readings)[0]
-    found = fit(null_problem.with_force(0.5 * (both[:n] + both[n:])), effects, 0)
+    both = chain.force(values, np.zeros((1, chain.linear_size)), problem.readings)[0]
+    found = fit(problem.with_force(0.5 * (both[:n] + both[n:])), effects, 0)
     assert found.u[first] == pytest.approx(3.5, abs=0.3)
     assert found.chi2 < 0.05 * n, "what prior and bow leave"
 
 
-def test_a_start_that_is_no_muscle_is_refused(null_problem: Problem) -> None:
+def test_a_start_that_is_no_muscle_is_refused(problem: Problem) -> None:
     """No force is finite there: a search passes over it, as over every climb that does not end."""
     start = {"tip_factor": float("nan")}
     with pytest.raises(np.linalg.LinAlgError):
-        fit(null_problem, frozenset({"tip_shape"}), 0, start)
+        fit(problem, frozenset({"tip_shape"}), 0, start)

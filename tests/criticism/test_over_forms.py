@@ -6,9 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from rig import sets
 
-from criticism.test_hypotheses import problem_of, specimen_of
 from criticism.test_sizes import force_with
 from mpam_calib.criticism.data.problem import SIZE_PRIOR, Problem
 from mpam_calib.criticism.fitting.fit import fit
@@ -19,12 +17,6 @@ from mpam_calib.criticism.tasks.spread import Alone, spread_over
 
 HIDDEN = {"creep": ("creep_per_decade", 0.1), "force_drift": ("drift_N_per_min", 0.1)}
 """Causes so small that the data hardly tell in which form."""
-
-
-@pytest.fixture(scope="module")
-def problem() -> Problem:
-    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
-    return problem_of(specimen_of(recipe.name))
 
 
 def searched(problem: Problem, *causes: str) -> Search:

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from model.build import loops
 from rig import case as rig_case
-from rig import recipes, sets
+from rig import recipes
 
-from criticism.test_hypotheses import problem_of
+from criticism.test_hypotheses import null_recipe, problem_of
 from mpam_calib.criticism.data import problem as module
 from mpam_calib.criticism.data import rows
 from mpam_calib.model.readings import Readings
@@ -26,9 +26,15 @@ CYCLES = 40
 @pytest.fixture(scope="module")
 def durable() -> Specimen:
     """Two levels with forty cycles each."""
-    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
     recipe = replace(
-        recipe, levels=2, cycles=CYCLES, speeds=1, rows_max=6000, dwell=False, motion="triangle", floor=False
+        null_recipe(),
+        levels=2,
+        cycles=CYCLES,
+        speeds=1,
+        rows_max=6000,
+        dwell=False,
+        motion="triangle",
+        floor=False,
     )
     folder = Path(tempfile.mkdtemp())
     rig_case.write_case(recipes.build_case(recipe), folder / "specimen", folder / "truth.json")

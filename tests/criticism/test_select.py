@@ -16,6 +16,7 @@ from scipy import stats
 from criticism.order_four import draw_case
 from criticism.own_rates import made_with_rates_of_its_own
 from criticism.test_hypotheses import problem_of, specimen_of
+from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import Fit, fit
 from mpam_calib.criticism.selection import ranking, space
 from mpam_calib.criticism.selection import select as module
@@ -52,10 +53,8 @@ def test_the_simulated_model_comes_first(monkeypatch: pytest.MonkeyPatch) -> Non
         assert best[name] == getattr(recipe, name), name
 
 
-def test_held_out_levels_are_predicted_from_the_others() -> None:
+def test_held_out_levels_are_predicted_from_the_others(problem: Problem) -> None:
     """A model's held-out density falls when the held-out forces are wrong."""
-    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
-    problem = problem_of(specimen_of(recipe.name))
     held = problem.level == problem.level.max()
     index = (np.flatnonzero(~held), np.flatnonzero(held))
     from mpam_calib.criticism.fitting.predicted import predict_rows

@@ -6,9 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rig import sets
 
-from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.diagnose import _in_lab_units, within_declared
 from mpam_calib.criticism.fitting.fit import Fit, Under, chain_for, fit
@@ -24,12 +22,6 @@ from mpam_calib.specimen.declaration import GeometrySd
 
 CAUSE, SIZE_NAME = "creep", "creep_per_decade"
 TESTS = 120
-
-
-@pytest.fixture(scope="module")
-def problem() -> Problem:
-    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
-    return problem_of(specimen_of(recipe.name))
 
 
 def force_with(problem: Problem, start: Fit, forms: str, u: dict[str, float]) -> np.ndarray:

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 from rig import case as rig_case
-from rig import recipes, sets
+from rig import recipes
 from rig.muscle import polynomial_stress
 
 from criticism.found import search
+from criticism.test_hypotheses import null_recipe
 from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.searching.candidates import candidates
@@ -20,8 +21,7 @@ from mpam_calib.specimen import read
 
 def problem_with(folder: Path, factor: float) -> Problem:
     """A muscle that hides nothing; its bladder's test reads ``factor`` times the stress."""
-    recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
-    one = recipes.build_case(recipe)
+    one = recipes.build_case(null_recipe())
     place = folder / f"{factor}"
     rig_case.write_case(one, place, folder / "truth.json")
     simulation = one.muscle.simulation
