@@ -23,6 +23,13 @@ def sound() -> CalibrationView:
     return replace(muscle(n_draws=400), pressure_bias_sd_kPa=DECLARED_KPA)
 
 
+def sd_as_wide_as_the_band(view: CalibrationView) -> float:
+    """The sd (kPa) of an offset that by itself makes the blocked force's band as wide as it is."""
+    rows = view.quantity("blocked_force_N")
+    half = float(rows["q95"].iloc[-1] - rows["q05"].iloc[-1]) / 2.0
+    return half / (1.645 * SLOPE)
+
+
 def sampled(view: CalibrationView, mean: float, sd: float) -> CalibrationView:
     """The view of a run that has sampled the offset (true pressure minus reading, kPa)."""
     row = {"parameter": "pressure_bias_kPa", "unit": "kPa", "mean": mean, "sd": sd, "q50": mean}
@@ -61,9 +68,7 @@ def test_one_that_was_not_learnt_is_open_by_what_the_fit_leaves_of_it(sound: Cal
 
 
 def test_one_that_sets_the_width_does_so_by_what_the_fit_leaves_of_it(sound: CalibrationView) -> None:
-    rows = sound.quantity("blocked_force_N")
-    half = float(rows["q95"].iloc[-1] - rows["q05"].iloc[-1]) / 2.0
-    sd = half / (1.645 * SLOPE)
+    sd = sd_as_wide_as_the_band(sound)
     limit = gauge(sampled(replace(sound, pressure_bias_sd_kPa=1.2 * sd), 0.0, sd))
     assert limit is not None and "sets the width" in limit.sentence
 
@@ -73,9 +78,7 @@ def test_an_offset_about_zero_that_the_readings_told_is_narrowed_by_more_of_them
     sound: CalibrationView, declared: float, sets: bool
 ) -> None:
     """The fit leaves a little less than half of the declared sd, or a little more."""
-    rows = sound.quantity("blocked_force_N")
-    half = float(rows["q95"].iloc[-1] - rows["q05"].iloc[-1]) / 2.0
-    sd = half / (1.645 * SLOPE)
+    sd = sd_as_wide_as_the_band(sound)
     limit = gauge(sampled(replace(sound, pressure_bias_sd_kPa=declared * sd), 0.0, sd))
     assert limit is not None and limit.level == "good"
     assert ("sets the width" in limit.brief) == ("More loops do not help" in limit.sentence) == sets
@@ -86,10 +89,8 @@ def test_an_offset_about_zero_that_the_readings_told_is_narrowed_by_more_of_them
 
 
 def test_one_that_they_told_too_well_to_matter_is_not_told(sound: CalibrationView) -> None:
-    rows = sound.quantity("blocked_force_N")
-    half = float(rows["q95"].iloc[-1] - rows["q05"].iloc[-1]) / 2.0
     for share, told in ((0.4, False), (0.7, True)):
-        assert (gauge(sampled(sound, 0.0, share * half / (1.645 * SLOPE))) is not None) == told
+        assert (gauge(sampled(sound, 0.0, share * sd_as_wide_as_the_band(sound))) is not None) == told
 
 
 def test_one_level_tells_the_slope_of_a_line_through_zero(sound: CalibrationView) -> None:

@@ -9,10 +9,13 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 from mpam_calib.cli import main
+from mpam_calib.errors import InputError
+from mpam_calib.posterior.chains.sampling import Listener, Progress
 
 FAST = ("--no-correlated-noise", "--ess", "100")
 """Enough for tests of files and bytes: the noise of the small specimens is white."""
@@ -40,6 +43,12 @@ class Result:
         lines = self.unremarked.splitlines()
         assert len(lines) == 1, self.err
         return lines[0]
+
+
+def refuse(*arguments: object, listener: Listener, **options: object) -> NoReturn:
+    """A calibration that begins and finds that its data cannot be used."""
+    listener(Progress("warming up", 0, 1.0, 1.0, 0.0))
+    raise InputError("the data", "no finite probability", "readings")
 
 
 def command(*arguments: object) -> list[str]:

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import NoReturn
 
 import pytest
 
-from mpam_calib.errors import InputError
-from mpam_calib.posterior.chains.sampling import Listener, Progress
 from mpam_calib.run.odd import tell_odd
 from mpam_calib.specimen import read
 from mpam_calib.specimen.oddities import oddities
 
-from .command import FAST, Here
+from .command import FAST, Here, refuse
 from .small import Specimen, tensile_text
 
 
@@ -51,10 +48,6 @@ def test_calibrate_tells_them_and_its_output_stays(tmp_path: Path, here: Here) -
 def test_what_is_refused_is_told_in_one_line_all_the_same(
     muscle: Path, tmp_path: Path, here: Here, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(*arguments: object, listener: Listener, **options: object) -> NoReturn:
-        listener(Progress("warming up", 0, 1.0, 1.0, 0.0))
-        raise InputError("the data", "no finite probability", "readings")
-
     monkeypatch.setattr("mpam_calib.run.calibrate.calibrate", refuse)
     refused = here("calibrate", muscle, "-o", tmp_path / "run")
     assert refused.code == 2

@@ -8,12 +8,11 @@ from typing import NoReturn
 import numpy as np
 import pytest
 
-from mpam_calib.errors import InputError
 from mpam_calib.posterior.chains.sampling import Listener, Progress
 from mpam_calib.run.kept import Kept
 from mpam_calib.run.replaced import page_owner, tell_replaced
 
-from .command import Here
+from .command import Here, refuse
 from .small import Specimen, csv_text
 
 
@@ -73,10 +72,6 @@ def test_a_command_says_so_before_it_starts(
 def test_a_command_that_refuses_replaces_nothing_and_says_nothing_of_it(
     command: str, run_copy: Path, tmp_path: Path, here: Here, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(*arguments: object, listener: Listener, **options: object) -> NoReturn:
-        listener(Progress("warming up", 0, 1.0, 1.0, 0.0))
-        raise InputError("the data", "no finite probability", "readings")
-
     monkeypatch.setattr("mpam_calib.run.calibrate.calibrate", refuse)
     if command == "calibrate":
         finish(run_copy, "select", "models.csv")

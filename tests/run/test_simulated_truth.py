@@ -24,6 +24,13 @@ DECLARED_71 = GEOMETRY.replace("72.0", "71.0")
 UNCERTAIN = "[geometry.sd]\nalpha0_deg = 2.0\n[sensors]\npressure_bias_sd_kPa = 20.0\n"
 
 
+def read_too_much(loops: str) -> str:
+    """Loops (CSV text) as a gauge reads them that is 15 kPa too high."""
+    header, *rows = loops.splitlines()
+    cells = [row.split(",") for row in rows]
+    return "\n".join([header, *(f"{t},{float(P) + 15.0:.6g},{x},{F}" for t, P, x, F in cells)]) + "\n"
+
+
 def as_put_in(made: Simulated, dead_band_kPa: float) -> Array:
     """Force (n,), N, of what ``truth.json`` says, by the contract's equations, with a braid of 72°."""
     loops, put = made.specimen.loops, made.parameters
@@ -49,9 +56,7 @@ def test_what_is_uncertain_stays_as_declared(
     geometry: str, hide: dict[str, float | None], dead_band_kPa: float, tmp_path: Path
 ) -> None:
     """The data are of a braid at 72° whose gauge reads 15 kPa too much: the fit would move both."""
-    header, *rows = loops_text().splitlines()
-    cells = [row.split(",") for row in rows]
-    text = "\n".join([header, *(f"{t},{float(P) + 15.0:.6g},{x},{F}" for t, P, x, F in cells)]) + "\n"
+    text = read_too_much(loops_text())
     made = simulate(read(Specimen(geometry=geometry + UNCERTAIN).write(tmp_path / "own", loops=text)), hide)
     assert not {"alpha0_deg", "pressure_bias_kPa"} & set(made.parameters)
     assert made.specimen.loops is not None
@@ -65,10 +70,7 @@ KNOWN_E_PA = 8.5e4
 
 def test_an_offset_that_was_declared_possible_does_not_end_in_the_declared_moduli(tmp_path: Path) -> None:
     """A gauge that reads 15 kPa too much, declared to 22.5 kPa; moduli that are right, declared to 10 %."""
-    text = loops_text(rows=40, moduli=((0.0, KNOWN_E_PA),))
-    header, *rows = text.splitlines()
-    cells = [row.split(",") for row in rows]
-    text = "\n".join([header, *(f"{t},{float(P) + 15.0:.6g},{x},{F}" for t, P, x, F in cells)]) + "\n"
+    text = read_too_much(loops_text(rows=40, moduli=((0.0, KNOWN_E_PA),)))
     tensile = f'moduli = "tensile"\nE_Pa = [{KNOWN_E_PA}]\nE_rel_sd = 0.1\n'
     simulation = f'[simulation]\n{tensile}friction = "coulomb"\n'
     sensors = "[sensors]\npressure_bias_sd_kPa = 22.5\n"

@@ -178,9 +178,8 @@ def test_a_few_strokes_too_fast_for_their_rows(shape: str, encoder: float) -> No
         way = way_of(shape, share)
         x = 20.0 * (np.where(number % 2 == 0, way, 1.0 - way) + encoder * rng.standard_normal(len(t)))
         x = np.round(x, 4)
-        found = read_motion(x, turn_threshold(x), noise_sd(x))
-        wrong += np.count_nonzero((found.branch != np.where(number % 2 == 0, -1, 1)) & ~found.unclear)
-        unclear += np.count_nonzero(found.unclear)
+        misread, untold = rows_misread(x, number)
+        wrong, unclear = wrong + misread, unclear + untold
         strokes += len(rows)
     assert wrong / strokes < 0.1
     assert unclear / strokes < 3.5
@@ -205,9 +204,8 @@ def test_rows_that_no_motion_tells_are_few_and_known(shape: str, hold: float, qu
         way = way_of(shape, share)
         x = 20.0 * np.where(number % 2 == 0, way, 1.0 - way)
         x = np.round(x / quantum) * quantum if quantum else x
-        found = read_motion(x, turn_threshold(x), noise_sd(x))
-        wrong += np.count_nonzero((found.branch != np.where(number % 2 == 0, -1, 1)) & ~found.unclear)
-        unclear += np.count_nonzero(found.unclear)
+        misread, untold = rows_misread(x, number)
+        wrong, unclear = wrong + misread, unclear + untold
         strokes += 2 * cycles
     assert wrong / strokes < 0.1
     assert unclear / strokes < (0.6 if shape == "full speed" and not hold else 3.5)
@@ -232,12 +230,18 @@ def test_a_crosshead_that_gathers_its_speed_in_a_few_rows_is_not_held(ramp: floa
             np.minimum(since, left) - edge + edge**2 / (2.0 * ramp)
         )
         x = np.where(number % 2 == 0, way, 7.6 - way) + 0.00076 * rng.standard_normal(len(t))
-        found = read_motion(x, turn_threshold(x), noise_sd(x))
-        wrong += np.count_nonzero((found.branch != np.where(number % 2 == 0, -1, 1)) & ~found.unclear)
-        unclear += np.count_nonzero(found.unclear)
+        misread, untold = rows_misread(x, number)
+        wrong, unclear = wrong + misread, unclear + untold
         strokes += len(paces)
     assert wrong / strokes < 0.05
     assert unclear / strokes < 3.5
+
+
+def rows_misread(x: np.ndarray, number: np.ndarray) -> tuple[int, int]:
+    """Rows with a wrong branch, and rows that are unclear; strokes of even ``number`` contract."""
+    found = read_motion(x, turn_threshold(x), noise_sd(x))
+    wrong = (found.branch != np.where(number % 2 == 0, -1, 1)) & ~found.unclear
+    return np.count_nonzero(wrong), np.count_nonzero(found.unclear)
 
 
 def way_of(shape: str, share: np.ndarray) -> np.ndarray:

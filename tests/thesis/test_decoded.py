@@ -6,23 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from physics.test_check_values import VALUES
 
 from mpam_calib.thesis import decoded
 from mpam_calib.thesis.tables import NAMES, half_unit, table
-
-# Force (N) at γ = 0, 0.05, 0.10, 0.20 and free contraction, from an independent evaluation.
-CHECKS = {
-    ("MPAM1", 50): (16.02, 12.14, 8.35, 1.64, 0.2264),
-    ("MPAM1", 100): (34.98, 27.60, 20.66, 8.79, 0.2873),
-    ("MPAM1", 150): (54.80, 44.12, 33.87, 16.33, 0.3125),
-    ("MPAM1", 200): (73.25, 57.48, 44.05, 21.91, 0.3230),
-    ("MPAM1", 250): (94.32, 74.49, 57.90, 30.51, 0.3334),
-    ("MPAM2", 50): (20.40, 8.73, 4.27, -0.58, 0.1857),
-    ("MPAM2", 100): (42.35, 29.72, 19.50, 2.41, 0.2138),
-    ("MPAM2", 150): (74.18, 54.04, 38.58, 13.67, 0.2569),
-    ("MPAM2", 200): (96.03, 72.91, 53.50, 21.51, 0.2752),
-    ("MPAM2", 250): (117.58, 90.93, 67.85, 29.35, 0.2878),
-}
 
 
 def plain_force(P: float, gamma: float, E: list[float]) -> float:
@@ -42,11 +29,11 @@ def plain_force(P: float, gamma: float, E: list[float]) -> float:
     return F
 
 
-@pytest.mark.parametrize(("muscle", "level"), CHECKS)
+@pytest.mark.parametrize(("muscle", "level"), VALUES)
 def test_check_forces_and_free_contractions(muscle: str, level: int) -> None:
     i = list(decoded.LEVELS).index(level * 1e3)
     E = decoded.moduli(muscle)[i]
-    *forces, root = CHECKS[muscle, level]
+    *forces, root = VALUES[muscle, level]
     for gamma, expected in zip((0.0, 0.05, 0.10, 0.20), forces, strict=True):
         assert float(decoded.force(decoded.LEVELS[i], np.asarray(gamma), E)) == pytest.approx(
             expected, abs=0.01
