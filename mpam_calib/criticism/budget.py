@@ -13,7 +13,7 @@ from scipy import linalg
 from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import Fit
 from mpam_calib.criticism.fitting.predicted import beyond_noise
-from mpam_calib.criticism.fitting.refits import Set, best_of, ended, named_forms
+from mpam_calib.criticism.fitting.refits import Set, best_of, named_forms
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.unexplained.repeat import raw_residual
 
@@ -83,7 +83,7 @@ def _at_word(found: Search, causes: Set) -> dict[Set, float]:
     forms = named_forms(best)
     parts = [frozenset(p) for k in range(len(causes) + 1) for p in combinations(sorted(causes), k)]
     chosen = [tuple(forms[e] for e in sorted(part)) for part in parts]
-    tries = [[(names, ended(best)), (names, {})] for names in chosen]
+    tries = [[(names, best.ended), (names, {})] for names in chosen]
     fits = found.spread(best_of, [(0, each, False) for each in tries])
     return {
         part: np.inf if fitted is None else structured(found.problem, fitted.force)

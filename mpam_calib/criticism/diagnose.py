@@ -109,11 +109,11 @@ def diagnose(
         budget = misfit_budget(found, verdict.standing)
     gain = None
     if verdict.standing:
-        named = found.fits[verdict.standing, found.best_size(verdict.standing)]
+        named = found.best_fit(verdict.standing)
         gain = measure_gain(
             problem, tested.tested, named, WORKERS, partial(listener, "measuring the gain"), journal
         )
-    fits = [found.fits[s, found.best_size(s)] for s in (frozenset(), verdict.standing)]
+    fits = [found.best_fit(s) for s in (frozenset(), verdict.standing)]
     structure = list(zip(*(structure_tests(problem, f) for f in fits), strict=True))
     limits = {}
     if verdict.word in ("adequate", "named"):

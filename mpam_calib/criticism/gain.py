@@ -138,7 +138,7 @@ def _fold(
         # In the forms of all rows: those that tell them apart may be the very rows held out.
         in_its_forms = found.refit_like(named)
     index = (np.flatnonzero(~held), np.flatnonzero(held))
-    chosen_fits = [found.fits[e, found.best_size(e)] for e in (frozenset[str](), chosen)]
+    chosen_fits = [found.best_fit(e) for e in (frozenset[str](), chosen)]
     # No climb may have an end without these rows.
     fits = [*chosen_fits, in_its_forms or chosen_fits[-1]]
     results = [predict_rows(problem, fitted, index) for fitted in fits]

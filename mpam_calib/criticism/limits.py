@@ -16,7 +16,7 @@ from scipy import integrate, interpolate, linalg
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.climb import Climb, Place, furthest_of
 from mpam_calib.criticism.fitting.fit import Fit, chain_for, doubt_about
-from mpam_calib.criticism.fitting.refits import ended, named_forms
+from mpam_calib.criticism.fitting.refits import named_forms
 from mpam_calib.criticism.tasks.spread import Alone, Spread, held_problem
 from mpam_calib.model.effect import effect
 
@@ -80,7 +80,7 @@ def _band(task: tuple[Fit, Array, str]) -> tuple[float, Band] | None:
     setting = climb.problem.model.setting
     assert setting is not None
     (own,) = effect(form).parameters(setting)
-    start = ended(named)
+    start = named.ended
     u = np.array([start.get(name, 0.0) for name in climb.names], dtype=np.float64)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # of shapes that no muscle has

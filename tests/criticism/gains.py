@@ -81,7 +81,7 @@ def measure(recipe: recipes.Recipe) -> list[str] | None:
         return None
     for size in range(len(SIZES)):
         found.refit(verdict.standing, size)
-    named = found.fits[verdict.standing, found.best_size(verdict.standing)]
+    named = found.best_fit(verdict.standing)
     gain = measure_gain(found.problem, tested, named)
     if gain is None:
         return None

@@ -28,7 +28,7 @@ def share(problem: Problem) -> np.ndarray:
     forces = []
     for effects, u in ((frozenset([CAUSE]), SIZE), (frozenset(), 0.0)):
         chain = chain_for(key, effects)
-        at = dict(zip(start.names, start.u, strict=True))
+        at = start.ended
         values = {p.name: p.prior.from_normal(np.full((1, 1), at.get(p.name, u))) for p in chain.parameters}
         force = chain.force(values, start.eta[None], problem.readings)[0]
         forces.append(0.5 * (force[:n] + force[n:]))
@@ -91,7 +91,7 @@ def test_the_band_of_a_size_covers_whatever_doubt_was_due(problem: Problem) -> N
     readings, first, second = problem.lean
     key = problem.blueprint.model_dump_json()
     chain = chain_for(key, frozenset([CAUSE]))
-    at = dict(zip(start.names, start.u, strict=True))
+    at = start.ended
     values = {p.name: p.prior.from_normal(np.full((1, 1), at.get(p.name, SIZE))) for p in chain.parameters}
     guide = np.full(len(readings), float(problem.force.mean()))
     columns = doubt_columns(key, frozenset([CAUSE]), values, start.eta, readings, guide)
@@ -128,7 +128,7 @@ def test_columns_vanish_with_the_cause(problem: Problem) -> None:
     chain = chain_for(problem.blueprint.model_dump_json(), frozenset([CAUSE]))
 
     def size(u: float) -> float:
-        at = dict(zip(found.names, found.u, strict=True))
+        at = found.ended
         values = {p.name: p.prior.from_normal(np.full((1, 1), at.get(p.name, u))) for p in chain.parameters}
         key = problem.blueprint.model_dump_json()
         guide = np.full(len(readings), 10.0)

@@ -16,7 +16,6 @@ from mpam_calib.criticism.fitting.fit import Fit, fit
 from mpam_calib.criticism.fitting.forms import forms_of, price
 from mpam_calib.criticism.fitting.refits import (
     causes_of,
-    ended,
     in_another_form,
     other_forms,
     with_better_forms,
@@ -74,7 +73,7 @@ def with_better_forms_of(found: Fit, effect: str) -> Fit:
     """The best fit in which this effect alone has another form."""
     (kept,) = (e for e in found.effects if e.partition(":")[0] != effect)
     others = [
-        priced(fit(held_problem(), frozenset({kept, form}), 0, ended(found))) for form in forms_of(effect)
+        priced(fit(held_problem(), frozenset({kept, form}), 0, found.ended)) for form in forms_of(effect)
     ]
     return max(others, key=lambda f: f.log_evidence)
 

@@ -34,9 +34,7 @@ def left_out(problem: Problem, ranked: Ranked, levels: np.ndarray) -> Predicted:
     """Reading less prediction (N) of these levels' rows, and the prediction's covariance."""
     held = np.isin(problem.level, levels)
     best = ranked.best
-    found = fit(
-        problem.take(~held), frozenset(), best.size, dict(zip(best.names, best.u.tolist(), strict=True))
-    )
+    found = fit(problem.take(~held), frozenset(), best.size, best.ended)
     mean, covariance = predict_rows(problem, found, (np.flatnonzero(~held), np.flatnonzero(held)))
     return problem.force[held] - mean, covariance
 

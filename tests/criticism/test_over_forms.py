@@ -42,7 +42,7 @@ def test_one_cause_has_the_evidence_of_all_its_forms(problem: Problem) -> None:
     before = found.score(cause)
     found.refit_in_forms([cause])
     base = found.in_forms[cause][0]
-    start = dict(zip(base.names, base.u.tolist(), strict=True))
+    start = base.ended
     every = [evidence(made, (form,), start) for form in forms_of("force_drift")]
     expected = np.logaddexp.reduce(every) + np.log(SIZE_PRIOR[0]) + found.log_prior(cause)
     assert found.score(cause) == pytest.approx(expected, abs=0.05)
@@ -58,7 +58,7 @@ def test_two_causes_have_nearly_that_of_all_pairs_of_forms(problem: Problem) -> 
     found, causes = searched(made, *HIDDEN), frozenset(HIDDEN)
     found.refit_in_forms([causes])
     base = found.in_forms[causes][0]
-    ended = dict(zip(base.names, base.u.tolist(), strict=True))
+    ended = base.ended
     every = [evidence(made, pair, ended) for pair in product(*map(forms_of, sorted(HIDDEN)))]
     expected = np.logaddexp.reduce(every) + np.log(SIZE_PRIOR[0]) + found.log_prior(causes)
     assert found.score(causes) == pytest.approx(expected, abs=0.1)

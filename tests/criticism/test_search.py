@@ -48,7 +48,7 @@ def test_a_kind_is_looked_for_beside_the_partner(tmp_path: Path) -> None:
     problem = hiding([("order_too_low", 40.0), ("stress_softening", 8.0)], tmp_path)
     found = search(problem, (*sorted(PAIR), "length_offset", "wall_pressure"))
     assert found.sets[0] == PAIR
-    assert found.fits[PAIR, found.best_size(PAIR)].effects == {"order_too_low", "stress_softening:force"}
+    assert found.best_fit(PAIR).effects == {"order_too_low", "stress_softening:force"}
 
 
 def test_a_set_of_three_leaves_the_kinds_of_its_parts(tmp_path: Path) -> None:
@@ -178,7 +178,7 @@ def test_an_equation_that_is_a_little_off_is_not_left_to_a_bend(identifier: str)
     key, effects = problem.blueprint.model_dump_json(), frozenset({identifier})
     base = fit(problem, frozenset(), 0)
     climb = Climb(problem, chain_for(key, effects), 0, np.empty((len(problem), 0)))
-    u = np.array([dict(zip(base.names, base.u, strict=True)).get(name, 2.0) for name in climb.names])
+    u = np.array([base.ended.get(name, 2.0) for name in climb.names])
     values, guide = climb.values(u[None]), climb.guide()
     off = doubt_on_rows(problem, key, effects, values, base.eta, guide)
     true = climb.chain.force(values, base.eta[None], problem.middle())[0]
@@ -261,7 +261,7 @@ def test_no_set_that_comes_near_is_left_in_a_poor_form() -> None:
     near = [s for s in found.sets[:POLISHED] if found.score(s) > best - NEAR]
     assert len(near) > 3
     with spread_over(found.problem, 1) as spread:
-        fits = [found.fits[s, found.best_size(s)] for s in near]
+        fits = [found.best_fit(s) for s in near]
         again = list(spread(with_better_forms, fits))
     for before, after in zip(fits, again, strict=True):
         assert after.log_evidence == pytest.approx(before.log_evidence, abs=0.5), sorted(before.effects)

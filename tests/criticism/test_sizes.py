@@ -27,7 +27,7 @@ TESTS = 120
 def force_with(problem: Problem, start: Fit, forms: str, u: dict[str, float]) -> np.ndarray:
     """The force (n,) of a fitted simulation with effects more ("a" or "a+b"), coordinates as given, N."""
     chain, n = chain_for(problem.blueprint.model_dump_json(), frozenset(forms.split("+"))), len(problem)
-    at = dict(zip(start.names, start.u.tolist(), strict=True)) | u
+    at = start.ended | u
     values = {p.name: p.prior.from_normal(np.full((1, 1), at[p.name])) for p in chain.parameters}
     force = chain.force(values, start.eta[None], problem.readings)[0]
     return np.asarray(0.5 * (force[:n] + force[n:]))

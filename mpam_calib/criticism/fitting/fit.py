@@ -60,6 +60,11 @@ class Fit:
     under: tuple[Under, ...]
 
     @property
+    def ended(self) -> dict[str, float]:
+        """Where the climb ended: sampler coordinates by name."""
+        return dict(zip(self.names, self.u.tolist(), strict=True))
+
+    @property
     def log_share(self) -> float:
         """Log evidence (nats) with the prior of the remainder's size: the fit's term of a sum over sizes."""
         return self.log_evidence + log(SIZE_PRIOR[self.size])

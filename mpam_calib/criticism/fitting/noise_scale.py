@@ -54,7 +54,7 @@ def settle_noise(problem: Problem, space: Sequence[Simulation]) -> Problem:
     if not fits:
         return problem
     blueprint, found = max(fits, key=lambda item: _evidence(item[1].values()))
-    starts = {size: dict(zip(f.names, f.u.tolist(), strict=True)) for size, f in found.items()}
+    starts = {size: f.ended for size, f in found.items()}
     each = [
         _evidence(_fits(problem.with_noise_scale(float(np.exp(s))), blueprint, starts).values())
         for s in LOG_SCALES

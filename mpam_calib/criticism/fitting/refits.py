@@ -42,14 +42,9 @@ def bends(found: Fit) -> bool:
     return any(form not in equations_of(e) for e, form in named_forms(found).items())
 
 
-def ended(found: Fit) -> dict[str, float]:
-    """Where a fit ended."""
-    return dict(zip(found.names, found.u.tolist(), strict=True))
-
-
 def once_more(found: Fit) -> list[Try]:
     """One climb, in the forms of a fit and from where it ended."""
-    return [(tuple(sorted(found.effects)), ended(found))]
+    return [(tuple(sorted(found.effects)), found.ended)]
 
 
 def best_of(task: tuple[int, list[Try], bool]) -> Fit | None:
@@ -63,7 +58,7 @@ def best_of(task: tuple[int, list[Try], bool]) -> Fit | None:
 
 def with_doubt(found: Fit) -> Fit:
     """The fit with a doubt about the forms of its effects; as it is where that cannot be climbed."""
-    again = _better(None, tuple(sorted(found.effects)), found.size, ended(found), DOUBTS)
+    again = _better(None, tuple(sorted(found.effects)), found.size, found.ended, DOUBTS)
     return found if again is None else again
 
 
@@ -108,7 +103,7 @@ def with_two_other_equations(task: tuple[Fit, tuple[str, str]]) -> Fit | None:
     for forms in product(*(equations_of(e) for e in pair)):
         if all(form != own[e] for e, form in zip(pair, forms, strict=True)):
             choice = own | dict(zip(pair, forms, strict=True))
-            best = _better(best, tuple(choice.values()), found.size, ended(found))
+            best = _better(best, tuple(choice.values()), found.size, found.ended)
     return best
 
 
@@ -116,7 +111,7 @@ def _best_with(found: Fit, forms: list[str]) -> Fit | None:
     """The best fit in which one effect has one of these forms instead, at its word."""
     best: Fit | None = None
     for form in forms:
-        best = _better(best, _with(found, form), found.size, ended(found))
+        best = _better(best, _with(found, form), found.size, found.ended)
     return best
 
 
@@ -138,13 +133,13 @@ def with_better_forms(found: Fit) -> Fit:
 
 def _from_equations(found: Fit) -> list[Fit]:
     """Fits from the own equations on, each given up once for another form, the one that helps most first."""
-    start = _better(None, tuple(named_forms(found)), found.size, ended(found))
+    start = _better(None, tuple(named_forms(found)), found.size, found.ended)
     fits = [] if start is None else [start]
     while fits:
         best = now = fits[-1]
         for e in sorted(now.effects & named_forms(now).keys()):  # still in its own equation
             for form in forms_of(e)[1:]:
-                best = _better(best, _with(now, form), now.size, ended(now)) or best
+                best = _better(best, _with(now, form), now.size, now.ended) or best
         if best is now:
             break
         fits.append(best)
@@ -160,7 +155,7 @@ def _one_at_a_time(found: Fit, choice: Callable[[str], tuple[str, ...]]) -> Fit:
     best = found
     for e in sorted(named_forms(found)):
         for form in choice(e):
-            best = _better(best, _with(best, form), found.size, ended(best)) or best
+            best = _better(best, _with(best, form), found.size, best.ended) or best
     return best
 
 

@@ -22,7 +22,6 @@ from mpam_calib.criticism.fitting.refits import (
     bends,
     best_of,
     causes_of,
-    ended,
     in_another_form,
     named_forms,
     once_more,
@@ -115,7 +114,7 @@ class Search:
         if len(effects) == 1:
             names = _own_names(self.problem, effects)
             far = [dict.fromkeys(names, value) for value in STARTS if names]
-            starts = [{}, *(far if near is None else [ended(near)])]
+            starts = [{}, *(far if near is None else [near.ended])]
             return [((form,), start) for e in effects for form in flexible(e) for start in starts]
         if near is not None:
             return once_more(near)
@@ -153,10 +152,10 @@ class Search:
             base, own = self._known(part, at), self._known(other, at)
             assert base is not None
             form = flexible(new)[0] if own is None else named_forms(own)[new]
-            start = {} if own is None else {n: u for n, u in ended(own).items() if not is_bend(n)}
+            start = {} if own is None else {n: u for n, u in own.ended.items() if not is_bend(n)}
             choice = named_forms(base) | {new: form}
             if all(choice != seen for seen, _ in found):
-                found.append((choice, start | ended(base)))
+                found.append((choice, start | base.ended))
         return found
 
     def _known(self, effects: Set, size: int) -> Fit | None:
@@ -199,7 +198,7 @@ class Search:
         for left in sorted(effects):
             kept = {e: form for e, form in named_forms(found).items() if e != left}
             for new in (e for e in self.tested if e not in effects):
-                tries = [(tuple((kept | {new: form}).values()), ended(found)) for form in flexible(new)]
+                tries = [(tuple((kept | {new: form}).values()), found.ended) for form in flexible(new)]
                 tasks[frozenset([*kept, new]), 0] = (0, tries, self.doubting)
         for key, fit in zip(tasks, self.spread(best_of, tasks.values()), strict=True):
             if fit is not None and (key not in self.fits or fit.log_evidence > self.fits[key].log_evidence):

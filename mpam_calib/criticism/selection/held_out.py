@@ -75,8 +75,7 @@ def _left_out(problem: Problem, ranked: Ranked, levels: NDArray[np.int64]) -> tu
     """
     held = np.isin(problem.level, levels)
     best = ranked.best
-    start = dict(zip(best.names, best.u.tolist(), strict=True))
     blueprint = blueprint_of(problem, ranked.simulation)
-    found = fit(problem.take(~held), frozenset(), best.size, start, blueprint)
+    found = fit(problem.take(~held), frozenset(), best.size, best.ended, blueprint)
     mean, covariance = predict_rows(problem, found, (np.flatnonzero(~held), np.flatnonzero(held)), blueprint)
     return problem.force[held] - mean, covariance

@@ -230,7 +230,7 @@ def _climbs(
 
 def _at(found: Fit | None) -> Start:
     """Where another fit of the same model ended."""
-    return {} if found is None else dict(zip(found.names, found.u.tolist(), strict=True))
+    return {} if found is None else found.ended
 
 
 def _rates_by_size(problem: Problem, simulation: Simulation, free: Ranked | None) -> dict[int, Rates]:

@@ -12,7 +12,7 @@ from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.doubt import DOUBTS
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.fitting.forms import price
-from mpam_calib.criticism.fitting.refits import Set, ended
+from mpam_calib.criticism.fitting.refits import Set
 from mpam_calib.criticism.searching.searched import Search
 
 
@@ -25,7 +25,7 @@ def score_beside(found: Search, problem: Problem, effects: Set) -> float:
     known = found.fits[effects, len(SIZES) - 1]
     doubts = DOUBTS if found.doubting else ()
     try:
-        again = fit(problem, known.effects, known.size, ended(known), doubts=doubts)
+        again = fit(problem, known.effects, known.size, known.ended, doubts=doubts)
     except np.linalg.LinAlgError:
         return np.nan
     return again.log_evidence - sum(map(price, sorted(known.effects))) + found.log_prior(effects)

@@ -45,7 +45,7 @@ NO_RIVAL = Rival(-np.inf, frozenset())
 
 def load_cell_rival(found: Search, leading: Set) -> Rival:
     """A fault alone, or in place of some of the leading set's causes: at least as plain as that set."""
-    chosen = found.fits[leading, found.best_size(leading)].effects
+    chosen = found.best_fit(leading).effects
     faults = [FAULT]
     if CROSSHEAD_ZEROED in chosen:
         faults += [ZEROED, RESCALED]
