@@ -227,9 +227,7 @@ def told_of(cell: Rival | None, setting: Setting, seed: int) -> dict[str, Any] |
 
 def _limit(diagnosis: Diagnosis, identifier: str) -> dict[str, Any]:
     """How large an effect could be by itself without being seen, lab units."""
-    setting = diagnosis.problem.model.setting
-    assert setting is not None
-    (parameter,) = effect(identifier).parameters(setting)
+    (parameter,) = effect(identifier).parameters(diagnosis.problem.setting)
     low, high = (_round(x / si_factor(parameter.name)) for x in diagnosis.limits[identifier])
     return {"id": identifier, "parameters": {parameter.name: {"q05": low, "q95": high}}}
 

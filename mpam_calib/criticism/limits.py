@@ -44,14 +44,12 @@ def hidden_sizes(
     Beside it are noise, the causes that are ``named`` and the doubt about their forms, but no remainder: what
     that may hold could hide anything. An effect of several kinds has the band that holds those of all.
     """
-    setting = problem.model.setting
-    assert setting is not None
     kinds = [
         kind
         for e in effects
         if e not in named_forms(named)
         for kind in (e, *(f"{e}:{name}" for name in effect(e).kinds))
-        if len(effect(kind).parameters(setting)) == 1
+        if len(effect(kind).parameters(problem.setting)) == 1
     ]
     doubt = doubt_about(problem, problem.declared, named)
     tasks = [(named, doubt, kind) for kind in kinds]
@@ -77,9 +75,7 @@ def _band(task: tuple[Fit, Array, str]) -> tuple[float, Band] | None:
     """The log evidence (up to a constant) and the band; None where no muscle, or no reading, has it."""
     named, doubt, form = task
     climb = _beside(held_problem(), named, doubt, frozenset([form]))
-    setting = climb.problem.model.setting
-    assert setting is not None
-    (own,) = effect(form).parameters(setting)
+    (own,) = effect(form).parameters(climb.problem.setting)
     start = named.ended
     u = np.array([start.get(name, 0.0) for name in climb.names], dtype=np.float64)
     try:

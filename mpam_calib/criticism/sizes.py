@@ -83,6 +83,5 @@ def sizes_of(found: Search, effects: Set) -> Sizes:
     """A set's fit beside the remainder that suits it, and those with one of its effects in another form."""
     found.refit_in_forms([effects])
     fits = sorted(found.in_forms[effects], key=lambda f: -f.log_evidence)
-    setting = found.problem.model.setting
-    assert setting is not None
-    return Sizes(tuple(f for f in fits if f.log_evidence > fits[0].log_evidence - EXCLUDED), setting)
+    counting = tuple(f for f in fits if f.log_evidence > fits[0].log_evidence - EXCLUDED)
+    return Sizes(counting, found.problem.setting)

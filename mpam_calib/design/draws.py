@@ -17,6 +17,7 @@ from mpam_calib.model.effect import effect
 from mpam_calib.model.model import Model
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.remainder import SMOOTH
+from mpam_calib.model.state import Setting
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.prediction.beyond import Beyond
 from mpam_calib.prediction.curves import GRID, first_root
@@ -60,6 +61,11 @@ class MuscleDraws:
         }
         return cls(model, few, tolerance, Beyond.draw(model, few, seed))
 
+    @property
+    def _setting(self) -> Setting:
+        assert self.model.setting is not None
+        return self.model.setting
+
     def __len__(self) -> int:
         return len(self.draws)
 
@@ -72,9 +78,8 @@ class MuscleDraws:
 
     def curves(self, P: float, x: Array, gamma: Array) -> Array:
         """Friction-free force (N) of one design x (3 or 5,) at P (Pa) and contractions γ; (N, γ)."""
-        assert self.model.setting is not None
-        L0 = self.model.setting.geometry.L0
-        return self._force(np.asarray(x)[None, :], Readings.at_rest(np.asarray(P), L0 * gamma))
+        readings = Readings.at_rest(np.asarray(P), self._setting.geometry.L0 * gamma)
+        return self._force(np.asarray(x)[None, :], readings)
 
     def free_contractions(self, P: float, x: Array) -> Array:
         """First root of the friction-free force of one design, (N,).
@@ -104,8 +109,7 @@ class MuscleDraws:
         The moduli's block stays the run's own: its coordinates mean coefficients at the geometry of
         the tested muscle.
         """
-        setting = self.model.setting
-        assert setting is not None
+        setting = self._setting
         effects = tuple(e for e in setting.simulation.effects if not effect(e).of_test)
         if x.shape[-1] == 5:
             # One value for each design: the effects broadcast, which a declared braid need not.
@@ -118,20 +122,16 @@ class MuscleDraws:
 
     @property
     def _has_strands(self) -> bool:
-        assert self.model.setting is not None
-        return any(e.partition(":")[0] == STRANDS for e in self.model.setting.simulation.effects)
+        return any(e.partition(":")[0] == STRANDS for e in self._setting.simulation.effects)
 
     def _braid(self) -> Braid:
         """The declared braid; without one, strands as stiff as in chapter 3."""
-        assert self.model.setting is not None
-        declared = self.model.setting.braid
-        return declared or Braid(E_br_GPa=E_BR / GPA, nu_s=0.33, R_br_mm=0.11, n=48)
+        return self._setting.braid or Braid(E_br_GPa=E_BR / GPA, nu_s=0.33, R_br_mm=0.11, n=48)
 
     def _values(self, x: Array) -> dict[str, Array]:
         """The draws' values with the designs' geometry, deviations included, as (N, n) arrays."""
-        assert self.model.setting is not None
         drawn = {
-            "L0_mm": np.full(len(x), self.model.setting.geometry.L0),
+            "L0_mm": np.full(len(x), self._setting.geometry.L0),
             "R0_mm": x[:, 0],
             "t0_mm": x[:, 1],
             "alpha0_deg": x[:, 2],
@@ -147,8 +147,7 @@ class MuscleDraws:
 
     def _share(self, x: Array) -> Array:
         """Ideal gas force at rest length over that of the tested muscle, (n,): the remainder's scale."""
-        assert self.model.setting is not None
-        own = self.model.setting.geometry
+        own = self._setting.geometry
         ideal = x[:, 0] ** 2 * (2.0 * np.tan(x[:, 2]) ** 2 - 1.0)
         tested = own.R0**2 * (2.0 * np.tan(own.alpha0) ** 2 - 1.0)
         share: Array = np.maximum(ideal / tested, 0.0) if tested > 0.0 else np.ones(len(x))

@@ -104,11 +104,10 @@ def _budget(found: Diagnosis, content: dict[str, Any]) -> list[Block]:
         for title, effects in _compared(found).items()
     }
     middle = problem.middle()
-    assert problem.model.setting is not None
     maps = misfit.residual_maps(
-        middle.displacement / problem.model.setting.geometry.L0,
+        middle.displacement / problem.setting.geometry.L0,
         middle.sign,
-        problem.model.setting.levels[problem.level] / KPA,
+        problem.setting.levels[problem.level] / KPA,
         shown,
         float(np.sqrt(np.median(np.diagonal(problem.noise)))),
     )
@@ -140,8 +139,7 @@ def _compared(found: Diagnosis) -> dict[str, frozenset[str]]:
 
 def _parameters(found: Diagnosis) -> dict[str, Parameter]:
     """Every size on the page by its name."""
-    setting = found.problem.model.setting
-    assert setting is not None
+    setting = found.problem.setting
     forms = (*found.declared_forms, *found.limits)
     return {p.name: p for form in forms for p in effect(form).parameters(setting)}
 

@@ -96,9 +96,15 @@ class _Told(NamedTuple):
     typical: float
 
 
+def _scale(model: Model) -> float:
+    """The force (N) at which a growth of one counts."""
+    assert model.setting is not None
+    return model.setting.force_scale
+
+
 def _told(cut: Sequence[Windows | None], loops: Loops, model: Model) -> list[_Told]:
     """What each of these windows alone says."""
-    scale = 1.0 if model.setting is None else model.setting.force_scale
+    scale = _scale(model)
     every: list[_Told] = []
     for windows in cut:
         if windows is not None:
@@ -118,7 +124,7 @@ def _mode(seen: list[Windows], averaged: int, model: Model) -> NoiseLevel:
     """Posterior mode given what windows see."""
     names = [name for name in (WHITE, CORRELATED, TIME, GROWTH) if name in model.names]
     priors: dict[str, Prior] = {p.name: p.prior for p in model.parameters}
-    scale = 1.0 if model.setting is None else model.setting.force_scale
+    scale = _scale(model)
 
     typical = float(priors[WHITE].from_normal(np.zeros(1))[0]) if WHITE in priors else 0.0
     readings = [0.0]
@@ -161,7 +167,7 @@ def _mode(seen: list[Windows], averaged: int, model: Model) -> NoiseLevel:
 
 def _lost(told: _Told, noise: NoiseLevel, averaged: int, model: Model) -> float:
     """Nats that windows lose by another noise than their own."""
-    scale = 1.0 if model.setting is None else model.setting.force_scale
+    scale = _scale(model)
     usual = _paced(told.windows.usual(GROWTH in model.names))
     own, other = (_log_likelihood(usual, n, averaged, scale) for n in (told.level, noise))
     return own - other

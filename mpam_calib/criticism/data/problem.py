@@ -25,6 +25,7 @@ from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.model.noise import grown
 from mpam_calib.model.readings import Readings
+from mpam_calib.model.state import Setting
 from mpam_calib.model.tensile import half_waves
 from mpam_calib.posterior.likelihood.bins import LoopBins, bin_loops
 from mpam_calib.posterior.likelihood.covariance import StrokeCovariance
@@ -100,11 +101,16 @@ class Problem:
         """The blueprint as JSON: what a chain of the declared simulation is kept by."""
         return self.blueprint.model_dump_json()
 
+    @property
+    def setting(self) -> Setting:
+        """The setting of the muscle and its test."""
+        assert self.model.setting is not None
+        return self.model.setting
+
     @cached_property
     def force_scale(self) -> float:
         """The specimen's size of a force, N."""
-        assert self.model.setting is not None
-        return self.model.setting.force_scale
+        return self.setting.force_scale
 
     @property
     def cycles(self) -> Ints:
@@ -128,8 +134,7 @@ class Problem:
         n = len(self)
         x, travel = self.readings.displacement, self.readings.travel
         width = np.abs(x[n:] - x[:n])
-        assert self.model.setting is not None
-        both = width > LONG * self.model.setting.stroke
+        both = width > LONG * self.setting.stroke
         both |= width > FAST_SHARE * np.minimum(travel[n:], travel[:n])
         both |= np.abs(self._curvature) > CURVED * np.sqrt(np.diagonal(self.noise))
         one, two = np.flatnonzero(~both), np.flatnonzero(both)
@@ -369,8 +374,7 @@ def _held(bins: LoopBins, keep: Ints) -> tuple[Array, Array]:
 
 def _kernel(problem: Problem, own_share: float = STROKE_SHARE) -> Array:
     """The remainder's covariance for size 1 N (rank at most that of its half-waves)."""
-    setting = problem.model.setting
-    assert setting is not None
+    setting = problem.setting
     readings = problem.middle()
     waves = half_waves(readings.displacement / max(setting.stroke, 1e-9), HALF_WAVES)
     along = waves @ waves.T

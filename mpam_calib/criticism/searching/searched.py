@@ -357,9 +357,7 @@ class Search:
 
 
 def _own_names(problem: Problem, effects: Set) -> list[str]:
-    setting = problem.model.setting
-    assert setting is not None
-    return [p.name for e in effects for p in effect(e).parameters(setting)[:1]]
+    return [p.name for e in effects for p in effect(e).parameters(problem.setting)[:1]]
 
 
 def best_first(sets: set[Set], figure: Callable[[Set], float]) -> list[Set]:

@@ -83,9 +83,7 @@ def _tries(found: Search, beside: Set, size: int, fault: str) -> list[Try]:
     [(forms, start)] = [(tuple(sorted(beside)), {})] if known is None else once_more(known)
     if fault != FAULT:
         return [((*forms, fault), start)]
-    setting = found.problem.model.setting
-    assert setting is not None
-    knee = next(p for p in effect(FAULT).parameters(setting) if p.name == "cell_knee_N")
+    knee = next(p for p in effect(FAULT).parameters(found.problem.setting) if p.name == "cell_knee_N")
     low, high = knee.prior.from_normal(np.array([-FAR, FAR]))
     places = np.clip(np.array(KNEES) * np.max(found.problem.force), low, high)
     starts = knee.prior.to_normal(places).tolist()
