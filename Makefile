@@ -14,7 +14,7 @@ export MKL_NUM_THREADS := 1
 help:
 	@echo "make calibrate   calibrate the bundled data sets; reports in reports/*/report.html"
 	@echo "make test        linters, types, doctests and the test suite"
-	@echo "make test-long   statistical tests of several minutes"
+	@echo "make test-long   the long statistical tests: some hours in all"
 	@echo "make score       score diagnose on the locked hidden cases (resumable; SET=develop, practice, locked-halved ...)"
 	@echo "make gains       what named causes gain on held-out rows, beside an oracle (resumable; CASES=30)"
 	@echo "make benchmark   times the sampler beside nutpie and PyMC, in an environment of its own"
