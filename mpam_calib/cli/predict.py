@@ -29,7 +29,8 @@ def predict(
 
     Writes bands on force, blocked force and free contraction to RUN/predictions.csv, with the columns
     of bands.csv: q05 to q95 is the 90 % band. Of force_N the branch "mean" is the curve without
-    friction; "..._observed" is what a load cell would read, noise included. What lies beyond the data
+    friction; "..._observed" is what a load cell would read, noise included. All are of the settled
+    muscle: after many cycles, just after the pressure was reached. What lies beyond the data
     is marked as extrapolated, and outside the recorded pressures bands widen with the distance. Warns
     where the bands at an asked pressure are not to be relied on.
     """

@@ -99,6 +99,10 @@ class Readings:
             pace=zero,
         )
 
+    def settled(self) -> Readings:
+        """The same places (n,) at their levels, without a history: see :meth:`at_rest`."""
+        return replace(Readings.at_rest(self.pressure, self.displacement, self.sign), level=self.level)
+
     @staticmethod
     def of_map(grid: ForceMap, L0: float) -> Readings:
         """The rows of a force map (n,) of a muscle of length L0 (m), each on its branch."""

@@ -37,6 +37,18 @@ def fitted_force(model: Model, draws: Draws, readings: Readings) -> tuple[Array,
     return force.mean(axis=0), square
 
 
+def past_force(model: Model, draws: Draws, readings: Readings) -> Array:
+    """Mean force (n,), N, by which readings lie off those of the settled muscle, of which all bands are.
+
+    They owe it to the cycles, times and speeds of the test until then, and to a load cell that wandered.
+    """
+    assert model.chain is not None
+    eta = draws.eta[:, : model.linear_sizes[0]]
+    then, settled = (model.chain.force(draws.values, eta, rows) for rows in (readings, readings.settled()))
+    off: Array = (then - settled).mean(axis=0)
+    return off
+
+
 def fitted_stress(model: Model, draws: Draws, strain: Array) -> tuple[Array, Array]:
     """Mean stress (n,) of the law at strains (n,), Pa, and the remainder's mean square (n,), Pa²."""
     assert model.tensile is not None

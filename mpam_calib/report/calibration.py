@@ -25,6 +25,7 @@ from mpam_calib.report.numbers import decimals, fixed, row_with_band, significan
 from mpam_calib.report.one_branch import pull_of
 from mpam_calib.report.page import Page
 from mpam_calib.report.parameters import RIGHT, learnt_table, summary_table
+from mpam_calib.report.past import off_bands
 from mpam_calib.report.reach import MOST, contraction_band, still_pulling
 from mpam_calib.report.spoken import spoken
 from mpam_calib.report.tensile import tensile_lead, tensile_sections
@@ -107,7 +108,7 @@ def _sections(view: CalibrationView) -> list[Section]:
         caption = (
             "Dots: readings, or means of neighbours in one stroke. Line: median of the calibrated "
             "simulation; dark and light bands hold the true "
-            f"force with 50 % and 90 % probability.{_noisy_words(view)}{omitted}"
+            f"force with 50 % and 90 % probability.{_noisy_words(view)}{off_bands(view)}{omitted}"
         )
         colours = " Blue: loading (pulled back to length). Orange: unloading (contracting)." if moving else ""
         alt = f"Force against contraction with bands at {shown} pressure levels of {view.name}."

@@ -30,6 +30,7 @@ from mpam_calib.report.limit import Limit
 from mpam_calib.report.noise_size import NOISE_CAUTION, lasting_noise, noise_as_declared, noise_size
 from mpam_calib.report.numbers import significant
 from mpam_calib.report.one_branch import one_branch
+from mpam_calib.report.past import past
 from mpam_calib.report.reach import UNSEEN, between_ends, cut_off, extrapolation
 from mpam_calib.report.view import CalibrationView
 
@@ -233,6 +234,7 @@ CHECKS: tuple[Check, ...] = (
     ),
     Check(free_read),
     Check(early_roots),
+    Check(past),
     Check(overruled_slack),
     Check(
         full_length,

@@ -27,6 +27,7 @@ OBSERVED_COLUMNS = (
     "fitted_N",
     "low_N",
     "high_N",
+    "past_N",
     "cycle",
     "stroke",
     "time_s",
@@ -72,7 +73,8 @@ class CalibrationView:
     reduced reading (``OBSERVED_COLUMNS``): kind is loops, force_map, blocked_force, free_contraction
     or tensile; ``fitted_N`` is the posterior mean of the declared simulation *without* the remainder,
     ``low_N`` and ``high_N`` the 90 % band of another such reading (of as many rows), with it, at that
-    reading's own pressure and place. A free contraction has its reading in ``contraction``, and in these
+    reading's own pressure and place; of loops ``past_N`` is what a reading owes to the test's past, which
+    ``bands`` are without. A free contraction has its reading in ``contraction``, and in these
     columns contractions too, of which the band is that of the curve without a reading's noise; a tensile
     reading has the strain in ``contraction`` and stresses in Pa in the columns of force.
 

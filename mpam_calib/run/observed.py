@@ -19,7 +19,7 @@ from mpam_calib.posterior.likelihood.bins import LoopBins
 from mpam_calib.posterior.likelihood.covariance import lasting_share
 from mpam_calib.posterior.likelihood.points import KINDS, Points
 from mpam_calib.prediction.curves import BATCH_CELLS, contraction_grid, first_root, force_curves
-from mpam_calib.prediction.fitted import fitted_force, fitted_stress, noise_of
+from mpam_calib.prediction.fitted import fitted_force, fitted_stress, noise_of, past_force
 from mpam_calib.prediction.reading_noise import ReadingNoise
 from mpam_calib.report.view import OBSERVED_COLUMNS
 from mpam_calib.units import KPA
@@ -75,12 +75,13 @@ def _bins_frame(bins: LoopBins, calibration: Calibration, draws: Draws) -> tuple
     middle, halves = bins.middle(), (slice(len(bins)), slice(len(bins), None))
     places = [bins.readings.take(half) for half in halves]
     fitted, left = np.mean([fitted_force(calibration.model, draws, place) for place in places], axis=0)
+    past = np.mean([past_force(calibration.model, draws, place) for place in places], axis=0)
     rough = float(np.mean(draws.values[ROUGH] ** 2)) if ROUGH in draws.values else 0.0
     frame = _frame("loops", middle, bins.force, bins.slack, calibration)
     low, high = _bands(calibration, places, bins)
     frame = frame.assign(
         stroke=bins.segment, time_s=middle.time, cycle=middle.cycle,
-        fitted_N=fitted, low_N=low, high_N=high,
+        fitted_N=fitted, low_N=low, high_N=high, past_N=past,
     )  # fmt: skip
     return frame, (left + rough)[~bins.slack]
 

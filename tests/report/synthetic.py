@@ -98,7 +98,7 @@ def muscle(rows_per_branch: int = 240, n_draws: int = 2000, **changes: Any) -> C
                     {
                         "kind": "loops", "level_kPa": P, "pressure_kPa": P, "contraction": x,
                         "branch": branch, "force_N": reading, "fitted_N": fitted,
-                        "low_N": fitted - half, "high_N": fitted + half, "cycle": 1,
+                        "low_N": fitted - half, "high_N": fitted + half, "past_N": 0.0, "cycle": 1,
                         "stroke": 2 * number + (s > 0), "time_s": np.arange(len(x)) * 0.1, "censored": False,
                     }
                 )
