@@ -65,16 +65,6 @@ class Design:
     held_by: tuple[str, ...]
 
     @property
-    def held(self) -> str:
-        """What holds the design back, in short."""
-        parts = []
-        for words in (" at its upper bound", " at its lower bound"):
-            at = [name.removesuffix(words) for name in self.held_by if name.endswith(words)]
-            parts += [f"{', '.join(at)}{words}"] if at else []
-        others = [name for name in self.held_by if not name.endswith(" bound")]
-        return "; ".join([*parts, *others]).replace("at its", "at").replace(" bound", "") or "nothing"
-
-    @property
     def without_root(self) -> float:
         """Share of draws whose force stays positive as far as is looked."""
         return float(np.mean(self.contraction >= LIMIT - 1e-9))

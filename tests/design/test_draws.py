@@ -252,13 +252,10 @@ def test_a_design_s_row_is_that_of_its_draws_in_laboratory_units() -> None:
     assert table[["R_br_mm", "n"]].iloc[1].isna().all()
 
 
-def test_what_holds_a_design_back_is_said_in_short() -> None:
-    x, draws = X, np.array([0.3, 0.6, 0.6, 0.4])
-    held = ("R at its upper bound", "α at its upper bound", "t at its lower bound", "V_bl/V >= low")
-    found = Design("II", P, "q05", x, draws, draws, draws, held)
-    assert found.held == "R, α at upper; t at lower; V_bl/V >= low"
+def test_a_draw_that_pulls_to_the_end_of_the_curves_has_no_root() -> None:
+    contraction = np.array([0.3, 0.6, 0.6, 0.4])
+    found = Design("II", P, "q05", X, contraction, contraction, contraction, ())
     assert found.without_root == 0.5
-    assert Design("II", P, "q05", x, draws, draws, draws, ()).held == "nothing"
 
 
 def test_packed_strands_cost_what_their_energy_takes() -> None:
