@@ -21,12 +21,15 @@ from mpam_calib.criticism.fitting.predicted import predict_rows
 from mpam_calib.criticism.fitting.refits import Set, causes_of
 from mpam_calib.criticism.searching.candidates import HISTORY
 from mpam_calib.criticism.searching.search import open_search
+from mpam_calib.criticism.sizes import Sizes, sizes_of
 from mpam_calib.criticism.tasks.journal import Journal
 from mpam_calib.criticism.verdict import judge
 
 Array = NDArray[np.float64]
 
 FOLD_WIDTH = 3
+OPEN = 0.01
+"""Probability from which on a form is open."""
 
 
 @dataclass(frozen=True)
@@ -135,13 +138,17 @@ def _fold(
         # What a verdict on these rows alone would report: in "unexplained", only what stands even so.
         chosen = judge(found).standing
         found.refit_all((chosen, size) for size in range(len(SIZES)))
+        in_forms = sizes_of(found, chosen)
         # In the forms of all rows: those that tell them apart may be the very rows held out.
         in_its_forms = found.refit_like(named)
     index = (np.flatnonzero(~held), np.flatnonzero(held))
-    chosen_fits = [found.best_fit(e) for e in (frozenset[str](), chosen)]
-    # No climb may have an end without these rows.
-    fits = [*chosen_fits, in_its_forms or chosen_fits[-1]]
-    results = [predict_rows(problem, fitted, index) for fitted in fits]
+    after = _over_forms(problem, in_forms, index)
+    results = [
+        predict_rows(problem, found.best_fit(frozenset()), index),
+        after,
+        # No climb may have an end without these rows.
+        after if in_its_forms is None else predict_rows(problem, in_its_forms, index),
+    ]
     residuals = [problem.force[held] - mean for mean, _ in results]
     covariances = [covariance for _, covariance in results]
     return _Fold(
@@ -154,3 +161,18 @@ def _fold(
         ),
         chosen=chosen,
     )
+
+
+def _over_forms(
+    problem: Problem, sizes: Sizes, index: tuple[NDArray[np.intp], NDArray[np.intp]]
+) -> tuple[Array, Array]:
+    """Mean (h,) and covariance (h, h) of the mixture of all forms that the fitted rows leave open.
+
+    Forms that agree where they were fitted may be far apart where nothing was, as in a first cycle.
+    """
+    weights = np.where(sizes.weights >= OPEN, sizes.weights, 0.0)
+    weights /= weights.sum()
+    open_fits = [(w, f) for w, f in zip(weights, sizes.fits, strict=True) if w > 0.0]
+    each = [(w, *predict_rows(problem, fitted, index)) for w, fitted in open_fits]
+    mean = np.sum([w * m for w, m, _ in each], axis=0)
+    return mean, np.sum([w * (c + np.outer(m - mean, m - mean)) for w, m, c in each], axis=0)

@@ -15,8 +15,9 @@ from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import Fit, fit
 from mpam_calib.criticism.fitting.folds import FEWEST
 from mpam_calib.criticism.fitting.predicted import predict_rows
-from mpam_calib.criticism.gain import Z90, _Fold, measure_gain
+from mpam_calib.criticism.gain import Z90, _Fold, _over_forms, measure_gain
 from mpam_calib.criticism.searching.searched import Search
+from mpam_calib.criticism.sizes import Sizes
 from mpam_calib.criticism.tasks.spread import Alone
 from mpam_calib.specimen.declaration import Simulation
 
@@ -57,6 +58,35 @@ def test_named_causes_are_refitted_in_the_forms_that_were_named(problem: Problem
         assert again is not None
         assert again.effects == known.effects and again.log_evidence >= known.log_evidence - 5.0
         assert found.fits == {(causes, 0): before}
+
+
+def test_what_forms_that_are_all_open_foresee_is_their_mixture(problem: Problem) -> None:
+    """Mean and covariance of draws from the forms' own predictions; what is excluded has no part in it."""
+    held = problem.cycle == 1
+    softer = problem.force * (1.0 + 0.05 * np.exp(1.0 - problem.middle().cycle))
+    problem = replace(problem, force=softer)
+    rest = problem.take(~held)
+    forms = ("stress_softening", "stress_softening:power", "stress_softening:test-power")
+    known = tuple(
+        replace(fit(rest, frozenset([form]), 0), log_evidence=nats)
+        for form, nats in zip(forms, (0.0, -0.7, -9.0), strict=True)
+    )
+    index = (np.flatnonzero(~held), np.flatnonzero(held))
+    mean, covariance = _over_forms(problem, Sizes(known, problem.setting), index)
+    rng = np.random.default_rng(1)
+    shares = np.exp([0.0, -0.7]) / np.exp([0.0, -0.7]).sum()
+    drawn = np.concatenate(
+        [
+            rng.multivariate_normal(*predict_rows(problem, one, index), size=round(20000 * share))
+            for one, share in zip(known, shares, strict=False)
+        ]
+    )
+    apart = np.sqrt(np.diagonal(covariance))
+    assert apart.max() > 1.5 * np.sqrt(np.diagonal(predict_rows(problem, known[0], index)[1])).max()
+    np.testing.assert_array_less(np.abs(drawn.mean(axis=0) - mean), 0.05 * apart)
+    np.testing.assert_allclose(drawn.std(axis=0), apart, rtol=0.05)
+    scatter = np.corrcoef(drawn.T) - covariance / np.outer(apart, apart)
+    assert np.abs(scatter).max() < 0.05
 
 
 def test_of_two_levels_cycles_are_left_out(problem: Problem) -> None:
