@@ -357,6 +357,17 @@ def test_friction_turns_over_after_a_reversal(form: str, own: dict[str, float], 
     np.testing.assert_allclose(np.ravel(after.sign), expected, atol=1e-9)
 
 
+@pytest.mark.parametrize("form", ["", *(f":{name}" for name in effect("presliding").forms)])
+def test_a_reversal_that_vanishes_leaves_a_reading_at_the_very_turn_on_its_own_side(form: str) -> None:
+    setting = setting_for("presliding")
+    state = shaped(setting, replace(rows(setting), reversal=np.ones(60), travel=np.zeros(60)))
+    own = {p.name: 1.0 for p in effect(f"presliding{form}").parameters(setting)}
+    for share, side in ((1e-7, 1.0), (1.0, -1.0)):
+        own["reversal_mm"] = share * setting.stroke
+        after = applied(f"presliding{form}", state, setting, **own)
+        np.testing.assert_allclose(np.ravel(after.sign), side * state.readings.sign, atol=0.03)
+
+
 @pytest.mark.parametrize(
     ("form", "built"),
     [

@@ -87,6 +87,10 @@ SAME, NONE_LEFT = 1e-6, 1e-15
 AGAINST, REST, SLIDING = 2.0, 1.0, 0.0
 """How far friction turns on a level's first stroke: from against it, since pressurising moved the muscle;
 from none; or not at all, since no reversal began the stroke."""
+AT_TURN = 1e-4
+"""Share of the stroke that a reading has travelled at least. One at the very turn has its branch from whoever
+says that it is past it, by less than an encoder tells: a longer reversal still holds it on the old side of
+friction, as the equations do, but one that vanishes leaves it on its own, as no presliding does."""
 WHOLE = 2.0
 """Reversals in which a power of the travel turns friction over wholly: after one both equations agree."""
 MASING = 2.0
@@ -103,7 +107,7 @@ def _turning(
     turn 2/(1 + left(stroke)) over.
     """
 
-    def turned(readings: Readings, values: Values) -> Array:
+    def turned(readings: Readings, values: Values, least: float) -> Array:
         later = readings.test_cycle > 1.0
         reversal = np.where(later, 1.0, readings.reversal) if once else readings.reversal
         one, two = readings.strokes_before.T
@@ -112,16 +116,17 @@ def _turning(
         before = np.where(second, first, AGAINST / (1.0 + left_after_two))
         missing = np.where(one < FAR, left(one, reversal, values) * before, 0.0)
         swing = first + (AGAINST - missing - first) * reversal
-        travel = readings.travel * (quicker + (1.0 - quicker) * reversal)
+        travel = np.maximum(readings.travel, least) * (quicker + (1.0 - quicker) * reversal)
         return np.asarray(1.0 - swing * left(travel, reversal, values))
 
     def apply(state: State, values: Values, setting: Setting) -> State:
         own = {name: values[name] for name in OWN if name in values}
+        least = AT_TURN * setting.stroke
         if own["reversal_mm"].shape[1] > 1:  # it bends
-            return state._replace(sign=state.sign * turned(state.readings, own))
+            return state._replace(sign=state.sign * turned(state.readings, own, least))
 
         def of(sizes: Array) -> Array:
-            return turned(state.readings, dict(zip(own, np.hsplit(sizes, len(own)), strict=True)))
+            return turned(state.readings, dict(zip(own, np.hsplit(sizes, len(own)), strict=True)), least)
 
         return state._replace(sign=state.sign * over_distinct(np.hstack(list(own.values())), of))
 
