@@ -10,6 +10,7 @@ import pandas as pd
 
 from mpam_calib.criticism.diagnose import Diagnosis
 from mpam_calib.criticism.fitting.fit import by_equations
+from mpam_calib.criticism.limits import NO_ROOM
 from mpam_calib.criticism.verdict import BESIDE, TRACE, TRACE_SIZE, Verdict
 from mpam_calib.model.bend import FORM, is_bend
 from mpam_calib.model.effect import effect
@@ -236,30 +237,37 @@ def _limits(
         "size inside its 90 % band and these data would look the same. Where such a size would "
         "matter to you, make the measurement beside it."
     )
+    bands = [
+        (limit["id"], name, band) for limit in content["limits"] for name, band in limit["parameters"].items()
+    ]
+    no_room = {e for e, _, band in bands if (band["q05"], band["q95"]) == NO_ROOM}
     # Of a size with one sign no band holds nothing.
     signed = {n for n, p in parameters.items() if p.prior.from_normal(np.array([-1.0]))[0] < 0.0}
     seen = [
-        effect(limit["id"]).title.lower()
-        for limit in content["limits"]
-        for name, band in limit["parameters"].items()
-        if name in signed and not band["q05"] < 0.0 < band["q95"]
+        effect(e).title.lower()
+        for e, name, band in bands
+        if name in signed and e not in no_room and not band["q05"] < 0.0 < band["q95"]
     ]
     if seen:
         text += (
             f" Bands that exclude zero, though that is too little for a name: {', '.join(seen)}. Look at "
             "these first; one in ten does so by chance."
         )
+    if excluded := [effect(e).title.lower() for e in sorted(no_room)]:
+        text += (
+            f" These data have no room for any size of: {', '.join(excluded)}. Even the smallest that were "
+            "tried fit far worse than none."
+        )
     rows = [
         {
-            "effect": effect(limit["id"]).title,
+            "effect": effect(e).title,
             "parameter": name,
             "5 %": significant(band["q05"], 2),
             "95 %": significant(band["q95"], 2),
             "unit": parameters[name].printed_unit,
-            "what would show it": shown_by(limit["id"], specimen),
+            "what would show it": shown_by(e, specimen),
         }
-        for limit in content["limits"]
-        for name, band in limit["parameters"].items()
+        for e, name, band in bands
     ]
     formats = dict.fromkeys(["5 %", "95 %"], "{}")
     table = DataTable(pd.DataFrame(rows), "Sizes that these data leave room for", formats)

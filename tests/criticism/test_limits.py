@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.typing import NDArray
 from rig import case as rig_case
@@ -18,7 +19,7 @@ from scipy import integrate, linalg
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.doubt import DOUBTS
 from mpam_calib.criticism.fitting.fit import chain_for, fit
-from mpam_calib.criticism.limits import hidden_sizes
+from mpam_calib.criticism.limits import NO_ROOM, hidden_sizes
 from mpam_calib.criticism.searching.candidates import candidates
 from mpam_calib.model.effect import effect
 from mpam_calib.specimen import read
@@ -202,3 +203,39 @@ def test_the_band_of_an_effect_holds_those_of_all_its_kinds_that_are_in_play(pro
     named = fit(problem, NOTHING, 0)
     found = hidden_sizes(problem, ("force_drift", "length_offset", "wall_pressure"), named, spread)
     assert found == {"force_drift": (-3.0, 2.0), "length_offset": (0.5, 0.6)}
+
+
+def test_a_kind_that_the_data_have_no_room_for_counts_only_where_all_are_so(problem: Problem) -> None:
+    none = (-np.inf, NO_ROOM)
+    made = {"force_drift": none, "force_drift:settling": (-24.0, (-3.0, 1.0)), "length_offset": none}
+
+    def spread(function: object, tasks: list[tuple[object, object, str]]) -> list[Any]:
+        return [made.get(kind) for *_, kind in tasks]
+
+    found = hidden_sizes(problem, ("force_drift", "length_offset"), fit(problem, NOTHING, 0), spread)
+    assert found == {"force_drift": (-3.0, 1.0), "length_offset": NO_ROOM}
+
+
+@pytest.fixture(scope="module")
+def turned_at_once() -> Problem:
+    """Nothing hidden; each stroke begins with a reading at the very turn that is on its own side already."""
+    specimen = specimen_of("develop-null-000")
+    table = pd.read_csv(specimen.folder / "loops.csv")
+    strokes = table.groupby((table["branch"] != table["branch"].shift()).cumsum())
+    ahead = ["time_s", "displacement_mm", "force_N"]
+    rows = []
+    for _, stroke in strokes:
+        first, second = stroke[ahead].to_numpy()[:2]
+        turn = stroke.iloc[[0]].copy()
+        turn[ahead] = first - 0.5 * (second - first)  # half a step ahead of it
+        rows += [turn, stroke]
+    pd.concat(rows).to_csv(specimen.folder / "loops.csv", index=False)
+    return problem_of(read(specimen.folder))
+
+
+def test_a_size_that_is_better_than_its_neighbours_alone_is_no_size_that_could_hide(
+    turned_at_once: Problem,
+) -> None:
+    """Any presliding that is long enough to be looked at holds a reading at the turn on the old side."""
+    found = hidden_sizes(turned_at_once, ["presliding"], fit(turned_at_once, NOTHING, 0))
+    assert found == {"presliding": NO_ROOM}

@@ -41,6 +41,24 @@ def test_a_band_of_either_sign_that_excludes_zero_is_pointed_out(
     assert "compliance" not in text.html
 
 
+def test_an_effect_that_the_data_have_no_room_for_is_told_from_one_that_may_hide(
+    parameters: dict[str, Parameter],
+) -> None:
+    offset, compliance = parameters
+    content: dict[str, Any] = {
+        "causes": [],
+        "not_tested": [],
+        "limits": [
+            {"id": "length_offset", "parameters": {offset: {"q05": 0.0, "q95": 0.0}}},
+            {"id": "rig_compliance", "parameters": {compliance: {"q05": 1e-6, "q95": 1e-4}}},
+        ],
+    }
+    text = _limits(content, parameters, specimen_of("develop-null-006"))[0]
+    assert isinstance(text, Text)
+    assert "no room for any size of: length offset." in text.html
+    assert "exclude zero" not in text.html
+
+
 def test_effects_without_a_limit_are_named(parameters: dict[str, Parameter]) -> None:
     """Not those that are causes, that have one, or that these data are silent on anyway."""
     band = {"q05": -0.1, "q95": 0.3}
