@@ -5,6 +5,7 @@ And its steps, with and without coordinates that are stuck.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -66,3 +67,15 @@ def test_a_stuck_coordinate_takes_no_step_and_the_others_the_best_without_it(stu
     assert np.all(step[stuck] == 0.0)
     np.testing.assert_array_equal(hessian, before[0])
     np.testing.assert_array_equal(gradient, before[1])
+
+
+def test_a_size_that_no_muscle_has_is_worth_nothing_and_passes_in_silence(problem: Problem) -> None:
+    """A fixture that gives so much that the muscle would have turned inside out, before its tips are bent."""
+    both = frozenset(["rig_compliance", "tip_shape"])
+    climb = Climb(problem, chain_for(problem.declared, both), 0, np.empty((len(problem), 0)))
+    u = np.zeros(len(climb.names))
+    u[climb.names.index("compliance_mm_per_N")] = 36.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        place = climb.look(u, climb.guide(), np.zeros(climb.chain.linear_size))
+    assert place.objective == -np.inf

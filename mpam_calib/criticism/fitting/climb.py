@@ -163,8 +163,12 @@ class Climb:
         """The measured force at the lean readings: the first estimate of what depends on the force."""
         return self.problem.at_lean(self.problem.force)
 
+    @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of shapes that no muscle has
     def look(self, u: Array, guide: Array, eta: Array) -> Place:
-        """Linearise at u; ``eta`` (p,) serves where the force depends on itself."""
+        """Linearise at u; ``eta`` (p,) serves where the force depends on itself.
+
+        Where no muscle has such a shape the objective is -inf.
+        """
         problem, p = self.problem, self.chain.linear_size
         _, first, second = problem.lean
         points, guides, nudge = u + self._offsets, guide, NUDGE * problem.force_scale

@@ -88,7 +88,8 @@ class Collapsed:
         result = np.full(len(u), -np.inf)
         inside = np.all(np.isfinite(u), axis=1) & np.all(np.abs(u) < 37.0, axis=1)
         if inside.any():
-            likelihood = self.log_likelihood(self.model.values(u[inside]))
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # shapes that no muscle has
+                likelihood = self.log_likelihood(self.model.values(u[inside]))
             result[inside] = prior[inside] + np.where(np.isfinite(likelihood), likelihood, -np.inf)
         return result
 
