@@ -121,6 +121,12 @@ def test_static_points_know_no_way_since_a_turn(problem: Problem) -> None:
     assert other[still.blueprint.simulation.friction] in candidates(still).tested
 
 
+def test_all_that_asks_for_times_says_that_a_force_map_has_none(problem: Problem) -> None:
+    left = dict(candidates(replace(problem, has_clock=False)).not_tested)
+    timed = ("rate_friction", "creep", "force_drift", "stress_softening")
+    assert {left[e] for e in timed} == {"no clock in a force map"}
+
+
 def test_a_force_that_depends_on_itself_is_linearised_as_it_moves() -> None:
     """Moduli that add a newton give way by what a fixture gives, too."""
     recipe = next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "loops")

@@ -51,7 +51,7 @@ def _why_not(identifier: str, problem: Problem) -> str | None:
         sign = readings.sign[problem.stroke >= 0] if identifier == "presliding" else readings.sign
         if not (np.any(sign > 0) and np.any(sign < 0)):
             return "no loops with both branches"
-    if identifier in HISTORY and not problem.has_clock:
+    if identifier in (*HISTORY, "rate_friction") and not problem.has_clock:
         return f"no clock in a {KINDS[0].replace('_', ' ')}"
     if identifier == "stress_softening" and len(problem.cycles) < 2:
         return "one cycle"
