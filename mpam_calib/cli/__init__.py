@@ -7,6 +7,7 @@ import io
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from types import FrameType
 
 from mpam_calib.errors import InputError, Interrupted
@@ -95,6 +96,8 @@ def _run() -> int:
 
     from mpam_calib.cli.app import app
 
+    if place := _empty_word(sys.argv[1:]):
+        return _refused(f"{place}: found an empty word, expected a name or a value")
     if len(sys.argv) == 1:
         app(["--help"], standalone_mode=False)
         return _refused("command line: found no command, expected one of those above")
@@ -113,6 +116,20 @@ def _run() -> int:
         # The parser has swallowed Ctrl-C.
         raise Interrupted
     return code
+
+
+def _empty_word(words: Sequence[str]) -> str:
+    """Where the command line has an empty word, as an unset variable leaves it; "" where it has none.
+
+    A path would take it for the current folder, and nothing else takes it at all.
+    """
+    for before, word in zip(["", *words], words, strict=False):
+        name, mark, value = word.partition("=")
+        if name.startswith("--") and mark and not value:
+            return name
+        if not word.strip():
+            return before if before.startswith("-") else "command line"
+    return ""
 
 
 def _refused(message: str) -> int:

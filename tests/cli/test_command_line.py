@@ -281,3 +281,39 @@ def test_a_data_file_is_no_specimen(tmp_path: Path) -> None:
     assert result.stderr.endswith(
         "loops.csv: found a data file, expected a specimen folder with its specimen.toml\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("words", "place"),
+    [
+        *(
+            ([command, "specimen", "-o", ""], "-o")
+            for command in ("calibrate", "select", "diagnose", "simulate")
+        ),
+        (["reproduce", "--output="], "--output"),
+        (["calibrate", "specimen", "--output", " "], "--output"),
+        *(([name, ""], "command line") for name in ("init", "check", "predict", "optimize")),
+    ],
+)
+def test_an_empty_word_is_no_folder(
+    words: list[str],
+    place: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """As an unset variable leaves it: not the current folder, in which nothing is written."""
+    make(tmp_path / "specimen", DECLARATION, loops=loops().text())
+    before = sorted(tmp_path.rglob("*"))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["mpam-calib", *words])
+    ctrl_c = signal.getsignal(signal.SIGINT)
+    try:
+        with pytest.raises(SystemExit) as end:
+            main()
+    finally:
+        signal.signal(signal.SIGINT, ctrl_c)
+    assert end.value.code == 2
+    told = capsys.readouterr()
+    assert (told.out, told.err) == ("", f"error: {place}: found an empty word, expected a name or a value\n")
+    assert sorted(tmp_path.rglob("*")) == before
