@@ -22,7 +22,7 @@ from mpam_calib.specimen.declaration import Declaration, FileKind
 from mpam_calib.specimen.levels import medians_by_label, merge_levels, static_levels
 from mpam_calib.specimen.loops import LoopsRead, read_loops
 from mpam_calib.specimen.recording import BlockedForce, Bools, FileRead, Floats, FreeContraction, Specimen
-from mpam_calib.specimen.source import DataFile, data_files, digest
+from mpam_calib.specimen.source import DataFile, data_files, digest, refuse_skipped_headers
 from mpam_calib.specimen.static_files import (
     ForceMapRead,
     read_blocked_force,
@@ -42,6 +42,7 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
     simulation = normalised_simulation(source, declaration)
     check_parts(source, declaration, data_required=data_required)
     files = data_files(source, declaration)
+    refuse_skipped_headers(source, files)
     floor = declaration.sensors.force_floor_N
     geometry = declaration.geometry
     rows: dict[FileKind, tuple[int, ...]] = {}

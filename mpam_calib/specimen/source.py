@@ -102,6 +102,20 @@ def _refuse_the_same(source: TomlSource, kind: FileKind, files: Sequence[DataFil
         )
 
 
+def refuse_skipped_headers(source: TomlSource, files: Sequence[DataFile]) -> None:
+    """Refuse rows to skip that hold the header of every file; where one has it below, they are for it."""
+    skipped = source.tables.get("csv", {}).get("skip_rows")
+    if skipped is None or not files or any(file.form.header_row > skipped for file in files):
+        return
+    file = files[0]
+    raise fault(
+        source,
+        ["csv", "skip_rows"],
+        f"{skipped}, with the header of {quoted(file.name)} in row {file.form.header_row}",
+        f"the number of rows above it ({file.form.header_row - 1})",
+    )
+
+
 def digest(tables: dict[str, Any], files: Sequence[Path]) -> str:
     """SHA-256 over the parsed declaration (comments and layout left out) and the files' bytes."""
     total = hashlib.sha256(json.dumps(tables, sort_keys=True, default=str).encode())

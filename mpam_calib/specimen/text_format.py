@@ -40,7 +40,7 @@ class Field:
 
 @dataclass(frozen=True)
 class TextFormat:
-    """How one file is written; its data begin below ``rows_above`` rows.
+    """How one file is written: its header in row ``header_row``, its data below ``rows_above`` rows.
 
     ``decimal_seen`` is false while no cell has shown a decimal mark yet.
     """
@@ -50,6 +50,7 @@ class TextFormat:
     delimiter: str
     decimal: str
     decimal_seen: bool
+    header_row: int
     rows_above: int
     cells: int
     fields: tuple[Field, ...]
@@ -107,6 +108,7 @@ def detect_format(
         delimiter,
         mark or ".",
         mark is not None,
+        row + 1,
         above,
         len(header),
         fields,

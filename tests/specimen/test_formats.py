@@ -103,6 +103,19 @@ def test_rows_to_skip_in_one_file_are_not_skipped_in_another(tmp_path: Path) -> 
     assert found.blocked_force.force_N == pytest.approx([3.5, 6.0, 9.0])
 
 
+@pytest.mark.parametrize("skipped", [3, 40, 10_000])
+def test_rows_to_skip_do_not_go_past_the_header(skipped: int, tmp_path: Path) -> None:
+    """Nor past the file's end."""
+    declaration = DECLARATION + f"[csv]\nskip_rows = {skipped}\n"
+    with pytest.raises(InputError) as refused:
+        read(make(tmp_path, declaration, loops="rig 3\nunits, below\n" + PLAIN))
+    line = declaration.splitlines().index(f"skip_rows = {skipped}") + 1
+    assert str(refused.value).endswith(
+        f'specimen.toml:{line}:csv.skip_rows: found {skipped}, with the header of "loops.csv" in row 3, '
+        "expected the number of rows above it (2)"
+    )
+
+
 def test_a_header_that_is_nowhere_is_missed_where_it_is_declared(tmp_path: Path) -> None:
     text = "made by;rig 3\nunits, below\nt,p,x,F\n" + PLAIN.partition("\n")[2]
     with pytest.raises(InputError, match=r"loops.csv:3"):
