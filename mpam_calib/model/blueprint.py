@@ -63,10 +63,11 @@ class Blueprint(Value):
     """Declaration and design of one specimen, SI units.
 
     ``stroke`` (m) is the largest recorded displacement, ``reach`` the largest contraction at each level,
-    ``onset`` the least with a force there (empty: nothing recorded), ``pulls_at`` (Pa) the lowest pressure
-    with a clear pull, ``stroke_time`` (s) the median duration of a stroke (None without loops),
-    ``reading_time`` (s) that between two readings, ``duration`` (s) that of the whole test, ``level_time``
-    (s) the longest at one level and ``speed`` (m/s) the geometric mean of the strokes' speeds.
+    ``onset`` the least with a force there (empty: nothing recorded), ``slack`` the largest at which a map's
+    muscle was slack (0 without any), ``pulls_at`` (Pa) the lowest pressure with a clear pull,
+    ``stroke_time`` (s) the median duration of a stroke (None without loops), ``reading_time`` (s) that
+    between two readings, ``duration`` (s) that of the whole test, ``level_time`` (s) the longest at one
+    level and ``speed`` (m/s) the geometric mean of the strokes' speeds.
     ``tensile_stiffness`` (Pa at a strain of one) is the scale of what a tensile test is fitted with;
     ``curves`` tells whether forces were recorded along the stroke, not at its ends alone.
     """
@@ -87,6 +88,7 @@ class Blueprint(Value):
     speed: float = 50.0 * MM / MINUTE
     branches: bool
     onset: tuple[float, ...] = ()
+    slack: tuple[float, ...] = ()
     free_contraction: bool
     curves: bool = True
     tensile_range: tuple[float, float] | None
@@ -139,6 +141,7 @@ def draw_blueprint(
         levels=tuple(float(level) for level in specimen.levels_Pa),
         stroke=stroke,
         reach=tuple(float(r) for r in reach),
+        slack=_slack(specimen),
         onset=_onset(specimen),
         pulls_at=pulls_at(specimen),
         stroke_time=None if loops is None else _stroke_time(loops),
@@ -179,6 +182,14 @@ def _reach(specimen: Specimen) -> Array:
     if known.any():
         reach[~known] = np.interp(levels[~known], levels[known], reach[known], left=0.0, right=0.0)
     return reach
+
+
+def _slack(specimen: Specimen) -> tuple[float, ...]:
+    """Largest contraction at each level (levels,) that a map's slack reading was taken at; 0 without any."""
+    slack = np.zeros(len(specimen.levels_Pa))
+    if (grid := specimen.force_map) is not None:
+        np.maximum.at(slack, grid.level[grid.censored], grid.contraction[grid.censored])
+    return tuple(slack.tolist())
 
 
 def _onset(specimen: Specimen) -> tuple[float, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -60,6 +60,8 @@ def muscle_bands(
 
     Curves end at the first grid point at or beyond the mean free contraction (``trim``). A pressure's bands
     are the same whichever others are asked for. Without ``recorded`` both branches are taken for recorded.
+    A slack reading beyond a free contraction tells of it: the muscle has come to no force before. Of the
+    force it tells but a bound: that is marked extrapolated from the last reading that pulls on.
     """
     reach = Reach.of(model.blueprint)
     grid = contraction_grid(model, float(reach.contraction.max()))
@@ -68,6 +70,9 @@ def muscle_bands(
     free = first_root(grid, curves.force[:, :, 2])
     outside = reach.outside(pressures)
     furthest = _furthest(reach, model, draws, pressures, free, grid, seed)
+    slack = furthest
+    if np.any(reach.slack > reach.contraction):
+        slack = _furthest(replace(reach, contraction=reach.slack), model, draws, pressures, free, grid, seed)
     unseen = past(furthest[:, None], grid) | reach.before(pressures[:, None], grid) | outside[:, None]
     parts = []
     for observed in (False, True):
@@ -98,7 +103,7 @@ def muscle_bands(
         parts.append(table.assign(extrapolated=unseen[:, 0] & ~read))
         table = _table(f"free_contraction{suffix}", pressures, np.zeros(1), "", contraction[:, :, None])
         rootless = np.isnan(_mean_free(free, grid))
-        table["extrapolated"] = outside | rootless | past(furthest, free.mean(axis=0))
+        table["extrapolated"] = outside | rootless | past(slack, free.mean(axis=0))
         parts.append(table.assign(contraction=np.nan))
     return pd.concat(parts, ignore_index=True)[COLUMNS]
 

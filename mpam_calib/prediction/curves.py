@@ -141,17 +141,23 @@ def past(furthest: Array, contraction: Array) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Reach:
-    """Where the data end: pressures (Pa), the largest contraction at each, and the least with a force."""
+    """Where the data end: pressures (Pa), the largest contraction at each, and the least with a force.
+
+    ``slack`` is the largest contraction at each up to which a reading, a slack one too, tells of the root.
+    """
 
     pressures: Array
     contraction: Array
     onset: Array
+    slack: Array
 
     @classmethod
     def of(cls, blueprint: Blueprint) -> Reach:
         """That of the recordings that a blueprint was drawn from."""
         levels = np.array(blueprint.levels)
-        return cls(levels, np.array(blueprint.reach), np.array(blueprint.onset or np.zeros(len(levels))))
+        reach, none = np.array(blueprint.reach), np.zeros(len(levels))
+        slack = np.maximum(reach, blueprint.slack or none)
+        return cls(levels, reach, np.array(blueprint.onset or none), slack)
 
     def beyond(self, pressure: Array, contraction: Array) -> NDArray[np.bool_]:
         """Whether a contraction lies past the largest recorded one, interpolated."""

@@ -112,7 +112,8 @@ def test_pressures_more_than_a_hundredth_of_the_highest_outside_the_levels_are_e
     assert (
         not found[found["pressure_kPa"] < 205.0].set_index("quantity").loc["free_contraction", "extrapolated"]
     )
-    reach = Reach(LEVELS, np.array([0.2, 0.25, 0.3]), np.zeros(3))
+    furthest = np.array([0.2, 0.25, 0.3])
+    reach = Reach(LEVELS, furthest, np.zeros(3), furthest)
     asked = np.array([0.97e5, 0.985e5, 0.99e5, 1.5e5, 2.01e5, 2.015e5, 2.03e5])
     assert reach.outside(asked).tolist() == [True, *[False] * 5, True]
     assert reach.between(np.array([0.985e5, 1.015e5, 1.03e5, 1.485e5])).tolist() == [

@@ -14,7 +14,7 @@ from mpam_calib.model.model import build_model
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.prediction.bands import muscle_bands
 from mpam_calib.prediction.curves import Reach
-from mpam_calib.specimen.recording import BlockedForce, FreeContraction, Specimen
+from mpam_calib.specimen.recording import BlockedForce, ForceMap, FreeContraction, Specimen
 
 TOP = 2e5
 FREE = {"pressure_Pa": np.array([1e5, 1.5e5, TOP]), "contraction": np.array([0.25, 0.28, 0.3])}
@@ -91,6 +91,32 @@ ENDS = (100.0, 300.0)
 """Levels, kPa, between which a muscle of known moduli is asked for."""
 
 
+@pytest.mark.parametrize(("slack_from", "told"), [(None, False), (0.9, False), (1.05, True)])
+def test_a_slack_reading_beyond_the_free_contraction_tells_of_it(
+    slack_from: float | None, told: bool
+) -> None:
+    """One before it does not, and neither tells of the force, which it but bounds."""
+    free = free_at(200.0)
+    contraction = np.array([0.0, 0.4, 0.8, *([] if slack_from is None else [slack_from])]) * free
+    rows = len(contraction)
+    made = build.specimen(
+        KNOWN,
+        levels_kPa=(200.0,),
+        force_map=ForceMap(
+            pressure_Pa=np.full(rows, 2e5),
+            contraction=contraction,
+            force_N=np.where(np.arange(rows) < 3, 10.0, 0.0),
+            level=np.zeros(rows, dtype=np.int64),
+            branch=np.zeros(rows, dtype=np.int64),
+            censored=np.arange(rows) >= 3,
+        ),
+    )
+    bands = marked(made)
+    assert bands.loc["free_contraction", "extrapolated"] == (not told)
+    assert bands.loc["free_contraction_observed", "extrapolated"] == (not told)
+    assert 0.79 * free < contractions(bands).max() < 0.83 * free
+
+
 def free_at(kPa: float) -> float:
     """The free contraction of the known muscle, whatever was recorded of it."""
     made = build.with_force(build.specimen(KNOWN, build.loops(ENDS)), np.full(48, 10.0))
@@ -125,7 +151,7 @@ def test_between_levels_the_share_of_the_way_to_the_end_is_what_was_recorded(
 
 
 def test_without_a_free_contraction_at_both_neighbours_the_reach_is_a_straight_line() -> None:
-    reach = Reach(np.array([1e5, 3e5]), np.array([0.1, 0.2]), np.zeros(2))
+    reach = Reach(np.array([1e5, 3e5]), np.array([0.1, 0.2]), np.zeros(2), np.array([0.1, 0.2]))
     pressure, known = np.array([1e5, 2e5, 3e5]), np.array([0.12, 0.25, 0.25])
     assert reach.along(pressure, known, np.array([0.125, 0.25])) == pytest.approx([0.1, 0.2, 0.2])
     for missing in (np.nan, 0.0):
