@@ -35,6 +35,9 @@ GAS = 3.0
 """Forces of muscles are within this factor of what the gas alone pulls."""
 BELOW_GAS = 10.0
 """A bladder that is not stretched beyond L0 adds no such multiple of the gas's own pull."""
+VACUUM, BY_VACUUM = 0.02, 0.1
+"""Share of the largest pressure by which a gauge may be off, and of the gas's push in a vacuum by which
+a load cell may."""
 SLOW_HZ, FAST = 0.05, 0.2
 """Readings rarer than this, and crossheads faster (m/s), are no tensile tester's."""
 STIFFNESS_PA = 100.0, 1e11
@@ -208,7 +211,24 @@ def _odd_forces(specimen: Specimen) -> list[str]:
                 f"{name}: forces up to {usual:.3g} N, while the gas alone pulls about {gas:.3g} N at the "
                 "highest pressure; are the units of force and pressure right, and R0_mm a radius?"
             )
+        remarks += _pulls_in_a_vacuum(name, geometry, pressure, contraction, force)
     return remarks + _odd_level_forces(specimen)
+
+
+def _pulls_in_a_vacuum(
+    name: str, geometry: Geometry, pressure: Floats, contraction: Floats, force: Floats
+) -> list[str]:
+    """Forces that no gas pulls with, since it is under less than the air's pressure."""
+    under = (pressure < -VACUUM * np.abs(pressure).max()) & (contraction > -STRETCHED)
+    if under.mean() < 1.0 - USUAL_SHARE:  # no level
+        return []
+    pulls, lowest = float(np.quantile(force[under], USUAL_SHARE)), float(np.median(pressure[under]))
+    if pulls <= BY_VACUUM * abs(_gas_force(geometry, lowest, 0.0)):
+        return []
+    return [
+        f"{name}: forces up to {pulls:.3g} N at {lowest / KPA:.4g} kPa, where a bladder under less than the "
+        "air's pressure cannot pull; is the pressure's sign right, and 0 the atmosphere, not a vacuum?"
+    ]
 
 
 def _odd_level_forces(specimen: Specimen) -> list[str]:
@@ -224,6 +244,8 @@ def _odd_level_forces(specimen: Specimen) -> list[str]:
         top[int(index)] = pulls if loops.displacement_m[at].min() > -STRETCHED * geometry.L0 else 0.0
     found = []
     for index, pulls in top.items():
+        if specimen.levels_Pa[index] < -VACUUM * np.abs(specimen.levels_Pa).max():
+            continue  # told of already
         gas = _gas_force(geometry, float(specimen.levels_Pa[index]), 0.0)
         others = float(np.median([force for other, force in top.items() if other != index]))
         if pulls > BELOW_GAS * gas and pulls > 0.5 * others:

@@ -47,6 +47,15 @@ def one_level_in_bar(rows: list[list[str]]) -> None:
             row[1] = f"{0.01 * float(row[1]):.8g}"
 
 
+def one_level_of(kPa: float) -> Change:
+    def change(rows: list[list[str]]) -> None:
+        for row in rows:
+            if abs(float(row[1]) - 50.0) < 10.0:
+                row[1] = f"{float(row[1]) - 50.0 + kPa:.8g}"
+
+    return change
+
+
 def blip(rows: list[list[str]]) -> None:
     rows[7][3] = "-8000"
 
@@ -65,7 +74,7 @@ def remarks(folder: Path, change: Change | None = None) -> str:
 
 def test_nothing_is_odd_in_a_plain_test(tmp_path: Path) -> None:
     found = remarks(tmp_path)
-    usual = ("seconds", "millimetres", "setpoint", "pascals", "bias")
+    usual = ("cannot pull", "seconds", "millimetres", "setpoint", "pascals", "bias")
     for words in ("far from", "gas alone", "the gas pulls", "zeroed", "grows with", *usual):
         assert words not in found
 
@@ -82,6 +91,7 @@ def test_nothing_is_odd_in_a_plain_test(tmp_path: Path) -> None:
             blip, "a force is far from all others (-8000 N, 0.7 s after the first reading)", id="a knock"
         ),
         pytest.param(one_level_in_bar, "N at 1 kPa, where the gas pulls about", id="one level in bar"),
+        pytest.param(one_level_of(-80.0), "N at -80 kPa, where a bladder under less than", id="a vacuum"),
         pytest.param(offset(3, -16.0), "every force at 50 kPa is below zero; was the load", id="zero"),
         pytest.param(from_the_other_end, "the force grows with the contraction at 3 of 3", id="reversed"),
         pytest.param(gust, "50 kPa has a reading far from it (-8000 kPa)", id="the same of a pressure"),
@@ -92,6 +102,10 @@ def test_nothing_is_odd_in_a_plain_test(tmp_path: Path) -> None:
 )
 def test_what_is_hardly_meant_is_said(change: Change, said: str, tmp_path: Path) -> None:
     assert said in remarks(tmp_path, change)
+
+
+def test_a_gauge_whose_zero_is_a_little_off_reads_no_vacuum(tmp_path: Path) -> None:
+    assert "cannot pull" not in remarks(tmp_path, one_level_of(-1.0))
 
 
 @pytest.mark.parametrize(("change", "more"), [(times(1, 0.01), True), (one_level_in_bar, False)])
