@@ -10,7 +10,9 @@ import typer
 import typer.core
 
 from mpam_calib.cli.app import app
+from mpam_calib.errors import InputError
 from mpam_calib.model.effect import effect, known_effects
+from mpam_calib.run.predict import parse_pressures
 from mpam_calib.specimen.declaration import Declaration, FileKind
 from mpam_calib.specimen.tables import TABLES
 from mpam_calib.specimen.toml_source import read_toml
@@ -74,3 +76,10 @@ def test_what_it_links_to_is_there() -> None:
     packages = re.findall(r"^      ([a-z]+)/ ", README, flags=re.MULTILINE)
     there = {p.parent.name for p in (ROOT / "mpam_calib").glob("*/__init__.py")}
     assert set(packages) == there
+
+
+def test_as_many_pressures_as_it_says_are_predicted_at_once() -> None:
+    (most,) = re.findall(r"`predict` at .* it takes at most (\d+)\)", README)
+    assert int(most) == len(parse_pressures(f"1:{most}:1"))
+    with pytest.raises(InputError, match=f"more than {most} pressures"):
+        parse_pressures(f"0:{most}:1")
