@@ -4,7 +4,8 @@ Up to the outer levels that is the fitted remainder, whose polynomials in pressu
 Below the lowest it goes on in proportion to the pressure, without which nothing pulls; above several levels
 as it is at the highest; above a single one, which cannot tell, in proportion as well, as a misfit of the
 gas's pull would. To each draw a random function of the contraction is added that nothing has been learnt
-about: of the remainder's own size one level's spacing away, and in proportion to the distance.
+about: of the remainder's own size one level's spacing away, and in proportion to the distance. Where the
+moduli are free at each level, their change is another (:mod:`~mpam_calib.prediction.free_moduli`).
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ class Beyond:
 
     ``pull`` (N/Pa) is the gas's at full length; ``size`` (N, 1), N, the remainder's sd and ``eta`` (N, k) its
     coordinates. ``below`` and ``above`` (N, degrees) are those of the new functions, alike for both branches;
-    ``kept`` (N, 1) says how much of what fades below the lowest level stays (one) or turns over, too.
+    ``kept`` (N, 1) says how much of what fades below the lowest level stays (one) or turns over, too;
+    ``changed`` (N, 2) how many sds free moduli change below and above.
     """
 
     remainder: Remainder
@@ -49,6 +51,7 @@ class Beyond:
     below: Array
     above: Array
     kept: Array
+    changed: Array
 
     @classmethod
     def draw(cls, model: Model, draws: Draws, seed: int) -> Beyond | None:
@@ -69,20 +72,23 @@ class Beyond:
             below=below,
             above=above,
             kept=KEPT_SD * rng.standard_normal((len(draws), 1)),
+            changed=rng.standard_normal((len(draws), 2)),
         )
 
-    def force(self, readings: Readings, known: Array) -> Array:
+    def force(self, readings: Readings, known: Array, moduli: Array | None = None) -> Array:
         """Force (N, n) that comes to the model's, ``known`` (N, n), at readings (n,).
 
-        0 from the lowest to the highest level.
+        ``moduli`` (N, n) is that of one sd by which free moduli change. 0 from the lowest to the highest
+        level.
         """
+        moduli = np.zeros_like(known) if moduli is None else moduli
         P, lowest, highest = readings.pressure, self.levels[0], self.levels[-1]
         added = np.zeros((len(self.size), len(readings)))
         below, above = np.flatnonzero((lowest > P) & (P >= 0.0)), np.flatnonzero(highest < P)
         if len(below):
-            added[:, below] = self._below(readings.take(below), known[:, below])
+            added[:, below] = self._below(readings.take(below), known[:, below], moduli[:, below])
         if len(above) and highest > 0.0:
-            added[:, above] = self._above(readings.take(above))
+            added[:, above] = self._above(readings.take(above)) + self.changed[:, 1:] * moduli[:, above]
         return added
 
     def _above(self, readings: Readings) -> Array:
@@ -92,13 +98,13 @@ class Beyond:
             added += self._fitted(readings) * (P / highest - 1.0)
         return added
 
-    def _below(self, readings: Readings, known: Array) -> Array:
+    def _below(self, readings: Readings, known: Array, moduli: Array) -> Array:
         P, lowest = readings.pressure, self.levels[0]
         share = P / lowest
         edge = self._fitted(replace(readings, pressure=np.full(len(P), lowest)))
         missed = self._along(self.below, readings) * ((lowest - P) / self._spacing)
         # What a wall or the gas is wrong by fades with the pressure; what a dead-band takes does not.
-        missed += self.kept * edge * (1.0 - share)
+        missed += self.kept * edge * (1.0 - share) + self.changed[:, :1] * moduli
         added: Array = share * edge - self._fitted(readings)
         # Without pressure nothing pulls: what is missed is at most the gas's whole pull. Where a dead-band or
         # a gauge's offset has made up for a misfit the model pulls even there: all of that may be wrong.

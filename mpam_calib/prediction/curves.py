@@ -18,6 +18,7 @@ from mpam_calib.posterior.density.target import predict_force
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.posterior.likelihood.covariance import ROUGH_LENGTH
 from mpam_calib.prediction.beyond import Beyond
+from mpam_calib.prediction.free_moduli import moduli_beyond
 from mpam_calib.prediction.reading_noise import ReadingNoise
 
 Array = NDArray[np.float64]
@@ -78,14 +79,16 @@ def force_curves(model: Model, draws: Draws, pressures: Array, contractions: Arr
     sign = np.array([1.0, -1.0, 0.0])[None, :, None]
     grid = np.broadcast_arrays(pressures[:, None, None], L0 * contractions[None, None, :], sign)
     readings = Readings.at_rest(*(g.ravel() for g in grid))
-    parts = []
+    parts, moduli = [], []
     size = max(1, BATCH_CELLS // len(readings))
     for i in range(0, len(draws), size):
         values = {k: v[i : i + size] for k, v in draws.values.items()}
         parts.append(predict_force(model, values, draws.eta[i : i + size], readings))
+        changed = moduli_beyond(model, values, draws.eta[i : i + size], readings)
+        moduli += [] if changed is None else [changed]
     force = np.concatenate(parts)
     if (beyond := Beyond.draw(model, draws, seed)) is not None:
-        force += beyond.force(readings, force)
+        force += beyond.force(readings, force, np.concatenate(moduli) if moduli else None)
     force = force.reshape(len(draws), *shape)
     if ROUGH in draws.values:
         for j, pressure in enumerate(pressures):
