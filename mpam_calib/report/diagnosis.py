@@ -11,13 +11,16 @@ import pandas as pd
 from mpam_calib.criticism.diagnose import Diagnosis
 from mpam_calib.criticism.fitting.fit import by_equations
 from mpam_calib.criticism.limits import NO_ROOM
+
+
+from mpam_calib.criticism.fitting.folds import FEWEST
 from mpam_calib.criticism.verdict import BESIDE, TRACE, TRACE_SIZE, Verdict
 from mpam_calib.model.bend import FORM, is_bend
 from mpam_calib.model.effect import effect
 from mpam_calib.model.priors import Parameter
 from mpam_calib.report import wording
 from mpam_calib.report.blocks import Block, DataTable, Figure, Section, Text
-from mpam_calib.report.diagnosis_lead import first_screen
+from mpam_calib.report.diagnosis_lead import HELD_OUT, first_screen
 from mpam_calib.report.figures import misfit
 from mpam_calib.report.measurements import not_tested, shown_by, telling
 from mpam_calib.report.numbers import probability, significant, with_band
@@ -291,7 +294,8 @@ def _gain(content: dict[str, Any]) -> list[Block]:
     gain = content["gain"]
     if gain is None:
         if content["causes"]:
-            return [Text("Not measured: of two pressure levels, or of two cycles, none can be left out.")]
+            few = f"Not measured: of fewer than {FEWEST} pressure levels, or cycles, none can be left out."
+            return [Text(few)]
         return [Text("Nothing is named, so there is nothing to gain.")]
     rows = [
         {
@@ -306,15 +310,20 @@ def _gain(content: dict[str, Any]) -> list[Block]:
         )
     ]
     text = (
-        f"Whole {gain['held_out']} groups were held out, {gain['folds']} folds, with search and fit repeated "
-        f"in each (after); {gain['folds_same_set']} of them chose the same causes. The held-out readings are "
-        f"{gain['elpd_gain']:.4g} ± {gain['elpd_gain_se']:.3g} nats more probable with the extended model "
-        "(each nat is a factor of 2.7). With fewer data a fold may recognise other causes: the last column "
-        f"keeps those named above, fitted anew in every fold ({gain['elpd_gain_named']:.4g} ± "
-        f"{gain['elpd_gain_named_se']:.3g} nats)."
+        f"Whole {HELD_OUT[gain['held_out']]} were held out, {gain['folds']} folds, with search and fit "
+        f"repeated in each (after); {gain['folds_same_set']} of them chose the same causes. The held-out "
+        f"readings are {_nats(gain, 'elpd_gain')} with what each fold chose than before (each nat is a "
+        "factor of 2.7). With fewer data a fold may recognise other causes: the last column keeps those "
+        f"named above, fitted anew in every fold ({_nats(gain, 'elpd_gain_named')})."
     )
     table = pd.DataFrame(rows)
     return [
         Text(text),
         DataTable(table, "Before and after, held out", dict.fromkeys(table.columns[1:], "{:.3g}")),
     ]
+
+
+def _nats(gain: dict[str, Any], key: str) -> str:
+    """A gain in words: one that is lost is no negative gain."""
+    nats, se = gain[key], significant(gain[f"{key}_se"], 2)
+    return f"{significant(abs(nats))} ± {se} nats {'less' if nats < 0.0 else 'more'} probable"

@@ -39,6 +39,9 @@ PARTLY_UNDECIDED = (
 CELL = "A load cell at fault explains these data better than any known set of causes does."
 DOUBTED = "No fault is shown beyond doubt, but {}: see “What else could it be”."
 
+HELD_OUT = {"cycle": "cycles", "pressure": "pressure levels"}
+"""What is left out as a whole, by its key in diagnosis.json."""
+
 COVERED = 0.75
 """Share of left-out readings below which 90 % bands are too narrow to go by."""
 
@@ -194,7 +197,7 @@ def _unproven(content: dict[str, Any]) -> list[str]:
     gain = content["gain"]
     if gain is None:
         return []
-    which = {"cycle": "cycles", "pressure": "pressure levels"}[gain["held_out"]]
+    which = HELD_OUT[gain["held_out"]]
     if against := _against(gain, "named", "elpd_gain_named", "these"):
         return [
             f"Readings of whole {which} that were left out speak against this result: {against}. "

@@ -11,7 +11,7 @@ from criticism.test_hypotheses import problem_of, specimen_of
 
 from mpam_calib.model.effect import effect
 from mpam_calib.report.blocks import DataTable, Notice, Text
-from mpam_calib.report.diagnosis import BENT, FORMS, _alternatives, _causes
+from mpam_calib.report.diagnosis import BENT, FORMS, _alternatives, _causes, _gain
 from mpam_calib.report.diagnosis_lead import _next, _unproven
 
 HOLDS = {
@@ -135,3 +135,15 @@ def test_what_comes_next_is_told_where_an_extended_model_holds_a_cause() -> None
     assert isinstance(notice, Notice)
     assert "mpam-calib calibrate RUN/extended -o" in notice.html
     assert _next([]) == []
+
+
+@pytest.mark.parametrize(
+    ("nats", "said"),
+    [(12345.6, "12300 ± 2.0 nats more probable"), (-41.26, "41.3 ± 2.0 nats less probable")],
+)
+def test_a_loss_is_not_told_as_a_gain(nats: float, said: str) -> None:
+    gain = HOLDS | {"elpd_gain": nats, "elpd_gain_named": nats, "coverage90_before": 0.3}
+    text, _ = _gain({"gain": gain | {"folds": 5, "folds_same_set": 4}})
+    assert isinstance(text, Text)
+    assert text.html.count(said) == 2
+    assert text.html.startswith("Whole cycles were held out")
