@@ -34,8 +34,9 @@ NEAR_NOTHING = (-3.5, -7.0)
 FEWEST, MOST_POINTS, FINE = 3, 400, 2000
 """Points at which the density is looked at, in all and on either side, and that are interpolated."""
 EXCLUDED = 5.0
-"""Nats behind the best kind of an effect (whose clock, which force) from which on a kind is left out; nats
-behind the fit without it from which on no size of an effect is left room for."""
+"""Nats behind the best kind of an effect (whose clock, which force) from which on a kind is left out: each at
+its best size, for one whose sizes are known the more narrowly may be there none the less; and nats behind
+the fit without it from which on no size of an effect is left room for."""
 
 NOTHING: frozenset[str] = frozenset()
 Band = tuple[float, float]
@@ -68,8 +69,8 @@ def hidden_sizes(
             found.setdefault(kind.partition(":")[0], []).append(band)
     bands = {}
     for e, of_kinds in found.items():
-        best = max(evidence for evidence, _ in of_kinds)
-        lows, highs = zip(*(band for evidence, band in of_kinds if evidence >= best - EXCLUDED), strict=True)
+        best = max(top for top, _ in of_kinds)
+        lows, highs = zip(*(band for top, band in of_kinds if top >= best - EXCLUDED), strict=True)
         bands[e] = (min(lows), max(highs))
     return bands
 
@@ -95,7 +96,7 @@ def _without(problem: Problem, named: Fit, doubt: Array) -> float:
 
 
 def _band(task: tuple[Fit, Array, float, str]) -> tuple[float, Band] | None:
-    """The log evidence (up to a constant) and the band; None where no muscle, or no reading, has it."""
+    """The highest log density and the band; None where no muscle, or no reading, has it."""
     named, doubt, without, form = task
     climb = _beside(held_problem(), named, doubt, frozenset([form]))
     (own,) = effect(form).parameters(climb.problem.setting)
@@ -129,14 +130,14 @@ def _walk_from(climb: Climb, named: Fit, i: int, start: float) -> tuple[Array, A
 
 
 def _told(points: Array, found: Array, own: Parameter) -> tuple[float, Band]:
-    """The evidence and the band of a log density ``found`` at coordinates of a size."""
+    """The top and the band of a log density ``found`` at coordinates of a size."""
     u = np.linspace(points[0], points[-1], FINE)
     log_density = interpolate.PchipInterpolator(points, found)(u)
     top = float(log_density.max())
     density = np.exp(log_density - top)
     mass = integrate.cumulative_trapezoid(density, u, initial=0)
     low, high = np.interp(BAND, mass / mass[-1], own.prior.from_normal(u))
-    return top + float(np.log(mass[-1])), (float(low), float(high))
+    return top, (float(low), float(high))
 
 
 def _walk(climb: Climb, mode: Place, i: int) -> tuple[Array, Array]:

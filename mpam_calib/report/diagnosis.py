@@ -10,10 +10,8 @@ import pandas as pd
 
 from mpam_calib.criticism.diagnose import Diagnosis
 from mpam_calib.criticism.fitting.fit import by_equations
-from mpam_calib.criticism.limits import NO_ROOM
-
-
 from mpam_calib.criticism.fitting.folds import FEWEST
+from mpam_calib.criticism.limits import NO_ROOM
 from mpam_calib.criticism.verdict import BESIDE, TRACE, TRACE_SIZE, Verdict
 from mpam_calib.model.bend import FORM, is_bend
 from mpam_calib.model.effect import effect

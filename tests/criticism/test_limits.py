@@ -16,11 +16,13 @@ from rig import recipes, sets
 from rig.effects import form as rig_form
 from scipy import integrate, linalg
 
+from mpam_calib.criticism import limits
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.doubt import DOUBTS
 from mpam_calib.criticism.fitting.fit import chain_for, fit
 from mpam_calib.criticism.limits import NO_ROOM, hidden_sizes
 from mpam_calib.criticism.searching.candidates import candidates
+from mpam_calib.criticism.tasks.spread import Alone
 from mpam_calib.model.effect import effect
 from mpam_calib.specimen import read
 from mpam_calib.units import si_factor
@@ -239,3 +241,14 @@ def test_a_size_that_is_better_than_its_neighbours_alone_is_no_size_that_could_h
     """Any presliding that is long enough to be looked at holds a reading at the turn on the old side."""
     found = hidden_sizes(turned_at_once, ["presliding"], fit(turned_at_once, NOTHING, 0))
     assert found == {"presliding": NO_ROOM}
+
+
+def test_a_kind_whose_sizes_are_known_narrowly_is_not_left_out_for_that(problem: Problem) -> None:
+    """Readings without creep: those of the whole force tell it far more exactly than the bladder's alone."""
+    nothing = fit(problem, NOTHING, 0)
+    problem = replace(problem, force=nothing.force)
+    named = fit(problem, NOTHING, 0)
+    tasks = [(named, np.zeros((len(problem), 0)), -np.inf, kind) for kind in ("creep", "creep:wall")]
+    (whole, (low, high)), (bladder, (lowest, highest)) = Alone(problem)(limits._band, tasks)
+    assert high - low < 0.2 * (highest - lowest)
+    assert whole == pytest.approx(bladder, abs=1.0)
