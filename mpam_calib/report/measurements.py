@@ -11,12 +11,13 @@ from mpam_calib.report.blocks import Block, DataTable, Text
 from mpam_calib.specimen.recording import Specimen
 
 TESTED: Final = {"order_too_low": "the tensile test, fitted at a higher order and at the muscle's strains"}
-"""What shows an effect where the bladder's tensile test is there already."""
+"""What shows an effect where the bladder's tensile test is there already, with the muscle or in a run."""
 
 
 def shown_by(identifier: str, specimen: Specimen) -> str:
     """The measurement that would show an effect, "" where none is known."""
-    if specimen.tensile is not None and identifier in TESTED:
+    tested = specimen.tensile is not None or specimen.simulation.moduli.startswith("run:")
+    if tested and identifier in TESTED:
         return TESTED[identifier]
     return effect(identifier).told_by
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 from typing import Any
 
@@ -22,9 +23,13 @@ def words_of(blocks: list[Block]) -> str:
     )
 
 
-@pytest.mark.parametrize("tested", [False, True])
-def test_a_tensile_test_is_asked_for_where_there_is_none(tested: bool) -> None:
-    specimen: Any = SimpleNamespace(tensile=object() if tested else None)
+@pytest.mark.parametrize(
+    ("test", "moduli", "tested"),
+    [(None, "loops", False), (object(), "loops", True), (None, "run:../material_run", True)],
+)
+def test_a_tensile_test_is_asked_for_where_there_is_none(test: object, moduli: str, tested: bool) -> None:
+    """Nor where the moduli are those of a run with one."""
+    specimen: Any = SimpleNamespace(tensile=test, simulation=SimpleNamespace(moduli=moduli))
     assert (shown_by(ORDER, specimen) == TEST) != tested
     assert (telling({ORDER}, set(), specimen) == TEST) != tested
     assert telling(set(), {"creep", ORDER}, specimen) == effect("creep").told_by
@@ -45,3 +50,8 @@ def test_a_tensile_test_is_asked_for_where_there_is_none(tested: bool) -> None:
     for blocks in pages:
         assert (TEST in words_of(blocks)) != tested
         assert ("the tensile test, fitted at a higher order" in words_of(blocks)) == tested
+
+
+def test_another_speed_is_asked_for_however_many_there_are() -> None:
+    """One is too few to test for the speed; three may be there already."""
+    assert not re.search("second|third", effect("rate_friction").told_by)

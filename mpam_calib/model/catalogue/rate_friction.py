@@ -112,7 +112,7 @@ register(
         stage=Stage.FRICTION,
         title="Rate-dependent friction",
         sentence="friction depends on speed: the loop is wider, or narrower, when the crosshead moves faster",
-        told_by="the same loop at a third speed, ten times slower or faster",
+        told_by="the same loop at one more speed, ten times slower or faster",
         source="logarithmic in speed, relative to the geometric mean of the test's speeds",
         parameters=_parameters,
         apply=_apply,
