@@ -235,8 +235,8 @@ def _limits(
     found = "Beside the causes named nothing was found" if content["causes"] else "Nothing was found"
     text = (
         f"{found}; that is not to say that nothing is there. Each effect by itself could have any "
-        "size inside its 90 % band and these data would look the same. Where such a size would "
-        "matter to you, make the measurement beside it."
+        "size inside its 90 % band, in one of its kinds at least, and these data would look the same. Where "
+        "such a size would matter to you, make the measurement beside it."
     )
     bands = [
         (limit["id"], name, band) for limit in content["limits"] for name, band in limit["parameters"].items()
