@@ -116,7 +116,8 @@ def _budget(found: Diagnosis, content: dict[str, Any]) -> list[Block]:
     return [
         Figure(
             misfit.budget([*names, "still unexplained"], [*newtons, left], content["noise_N"]),
-            "Each bar is the root of a cause's Shapley share of the squared misfit.",
+            "The bar of a cause is the root of its Shapley share of the squared misfit: what either of two "
+            "could explain by itself is shared between them, however small one is beside the other.",
             "Bars of the newtons that each cause explains",
         ),
         Figure(

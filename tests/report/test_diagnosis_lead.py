@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from criticism.test_hypotheses import specimen_of
+from criticism.test_hypotheses import problem_of, specimen_of
 
+from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.unexplained.load_cell import FAULT
-from mpam_calib.report.blocks import Headline, Verdict
-from mpam_calib.report.diagnosis import _compared
+from mpam_calib.report.blocks import Figure, Headline, Verdict
+from mpam_calib.report.diagnosis import _budget, _compared
 from mpam_calib.report.diagnosis_lead import first_screen
 from mpam_calib.report.figures.misfit import residual_maps
 
@@ -108,3 +109,17 @@ def test_residuals_are_drawn_of_what_their_titles_say(
     assert [ax.get_title(loc="left") for ax in figure.axes] == list(compared)
     (last,) = ([text.get_text() for text in ax.texts] for ax in figure.axes if ax.texts)
     assert last == ["9 kPa", "5 kPa"]  # which colour is which level
+
+
+def test_newtons_that_two_causes_share_are_told_as_shared() -> None:
+    """A braid angle of hundredths of a degree has two fifths of a creep's, as it could stand in for it."""
+    problem = problem_of(specimen_of("develop-null-006"))
+    none = frozenset[str]()
+    found: Any = SimpleNamespace(
+        problem=problem,
+        search=SimpleNamespace(fits={(none, 0): fit(problem, none, 0)}),
+        verdict=SimpleNamespace(standing=none, leading=none),
+    )
+    bars, _ = _budget(found, CONTENT)
+    assert isinstance(bars, Figure)
+    assert "what either of two could explain by itself is shared between them" in bars.caption
