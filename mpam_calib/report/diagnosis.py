@@ -233,9 +233,10 @@ def _limits(
     without = _without_limit(content, tested)
     if not content["limits"]:
         return without or [Text("No further effect was looked for.")]
-    found = "Beside the causes named nothing was found" if content["causes"] else "Nothing was found"
+    # Not "found": beside an adequate simulation a cause may even be the likelier.
+    shown = "Beside the causes named nothing was shown" if content["causes"] else "Nothing was shown"
     text = (
-        f"{found}; that is not to say that nothing is there. Each effect by itself could have any "
+        f"{shown}; that is not to say that nothing is there. Each effect by itself could have any "
         "size inside its 90 % band, in one of its kinds at least, and these data would look the same. Where "
         "such a size would matter to you, make the measurement beside it."
     )

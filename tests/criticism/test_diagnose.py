@@ -60,7 +60,7 @@ def test_further_causes_that_could_hide_beside_those_named_have_their_limits(
     further = [set(a["ids"]) for a in content["alternatives"] if set(a["ids"]) > runs[1]]
     assert len(further) >= 5
     page = (runs[0] / "report.html").read_text()
-    assert "Beside the causes named nothing was found" in page
+    assert "Beside the causes named nothing was shown" in page
 
 
 def test_the_same_again_is_kept(runs: tuple[Path, frozenset[str]]) -> None:
