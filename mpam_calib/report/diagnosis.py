@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mpam_calib.criticism.budget import remainder_rms
 from mpam_calib.criticism.diagnose import Diagnosis
 from mpam_calib.criticism.fitting.fit import by_equations
 from mpam_calib.criticism.fitting.folds import FEWEST
 from mpam_calib.criticism.limits import NO_ROOM
-from mpam_calib.criticism.verdict import BESIDE, TRACE, TRACE_SIZE, Verdict
+from mpam_calib.criticism.verdict import BESIDE, TRACE, TRACE_SIZE
 from mpam_calib.model.bend import FORM, is_bend
 from mpam_calib.model.effect import effect
 from mpam_calib.model.priors import Parameter
@@ -49,7 +50,7 @@ BENT = (
 def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen) -> Page:
     """The page for one diagnosis; ``content`` is that of ``diagnosis.json``."""
     causes, parameters, tested = content["causes"], _parameters(found), found.candidates.tested
-    lead = first_screen(content | _beyond_the_file(found.verdict), specimen)
+    lead = first_screen(content | _beyond_the_file(found), specimen)
     sections = [
         Section("Misfit budget", _budget(found, content)),
         Section("Where the misfit shows", _structure(content)),
@@ -67,10 +68,18 @@ def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen
     return Page(specimen.name, "Diagnosis: what the simulation gets wrong", lead, sections)
 
 
-def _beyond_the_file(verdict: Verdict) -> dict[str, Any]:
-    """What the first screen says that ``diagnosis.json`` has no key for."""
+def _beyond_the_file(found: Diagnosis) -> dict[str, Any]:
+    """What the first screen says that ``diagnosis.json`` has no key for.
+
+    Its remainder is beside the causes reported: without any it holds what the likeliest set explains, too.
+    """
+    verdict = found.verdict
     likely = verdict.probabilities.get(verdict.leading, 0.0)
-    return {"left": verdict.left, "leading": {"ids": sorted(verdict.leading), "probability": likely}}
+    return {
+        "left": verdict.left,
+        "left_N": remainder_rms(found.problem, found.search.best_fit(verdict.leading)),
+        "leading": {"ids": sorted(verdict.leading), "probability": likely},
+    }
 
 
 def _structure(content: dict[str, Any]) -> list[Block]:

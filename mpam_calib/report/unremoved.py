@@ -64,7 +64,7 @@ def only_recording(content: dict[str, Any]) -> bool:
 
 
 def unremoved(content: dict[str, Any]) -> list[str]:
-    """What no set of causes removes."""
+    """What no set of causes removes: ``left_N`` is the remainder beside the likeliest set."""
     found = []
     if content["saturated_share"] > 0.0:
         share = significant(100.0 * content["saturated_share"])
@@ -72,8 +72,9 @@ def unremoved(content: dict[str, Any]) -> list[str]:
     found += [said.format(significant(content[name])) for name, said in FAULTS.items() if content[name] > 0.0]
     if content["load_cell"]:
         found.append(_of_load_cell(**content["load_cell"]))
-    elif content["remainder_N"] > 0.0 or not (found or content["trace"]):
-        size = significant(content["remainder_N"])
+    elif content["left_N"] > 0.0 or not (found or content["trace"]):
+        # Where no remainder is needed either, the likeliest set's equations lessen nothing.
+        size = significant(content["left_N"] or content["misfit_after_N"])
         found.append(f"structure of {size} N is left beside every set tried")
     if content["trace"]:
         size, against = significant(content["trace"]["rms_N"]), content["trace"]["against"]

@@ -57,6 +57,7 @@ UNEXPLAINED: dict[str, Any] = CONTENT | {
     "misfit_before_N": 1.3,
     "misfit_after_N": 1.3,
     "remainder_N": 2.0,
+    "left_N": 2.0,
     "trace": None,
     "alternatives": [],
     "probability": 0.0,

@@ -15,6 +15,8 @@ FAULTLESS = {
     **dict.fromkeys(
         ("saturated_share", "repeating_N", "bursts_N", "hum_N", "step_N", "chatter_N", "remainder_N"), 0.0
     ),
+    "left_N": 0.0,
+    "misfit_after_N": 0.567,
     "load_cell": None,
     "trace": None,
 }
@@ -53,7 +55,7 @@ def test_every_fault_of_the_load_cell_has_words() -> None:
         ("hum_N", "a regulator that hunts"),
         ("chatter_N", "a guide that chatters"),
         ("step_N", "use a finer range"),
-        ("remainder_N", "beside every set tried"),
+        ("left_N", "beside every set tried"),
     ],
 )
 def test_a_fault_is_told_with_its_size_and_what_may_cause_it(fault: str, said: str) -> None:
@@ -71,7 +73,14 @@ def test_what_the_residuals_depend_on_is_told_beside_a_remainder() -> None:
     trace = {"trace": {"against": "branch", "rms_N": 0.0456}}
     (text,) = unremoved(FAULTLESS | trace)
     assert "still depends on branch (0.0456 N)" in text
-    assert len(unremoved(FAULTLESS | trace | {"remainder_N": 1.234})) == 2
+    assert len(unremoved(FAULTLESS | trace | {"left_N": 1.234})) == 2
+
+
+def test_what_is_left_is_not_what_the_likeliest_set_explains() -> None:
+    """The remainder beside no cause at all holds that as well; where none is needed the misfit is left."""
+    reported = FAULTLESS | {"remainder_N": 4.31}
+    assert unremoved(reported | {"left_N": 0.193}) == ["structure of 0.193 N is left beside every set tried"]
+    assert unremoved(reported) == ["structure of 0.567 N is left beside every set tried"]
 
 
 @pytest.mark.parametrize(
