@@ -2,23 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final
 
+import numpy as np
 import pandas as pd
 
 from mpam_calib.model.effect import effect
 from mpam_calib.report.blocks import Block, DataTable, Text
 from mpam_calib.specimen.recording import Specimen
 
-TESTED: Final = {"order_too_low": "the tensile test, fitted at a higher order and at the muscle's strains"}
-"""What shows an effect where the bladder's tensile test is there already, with the muscle or in a run."""
+STOPS: Final = 0.05
+"""Share of its largest blocked force below which a muscle has all but stopped pulling."""
+
+
+def _tested(specimen: Specimen) -> bool:
+    """Whether the bladder's tensile test is there already, with the muscle or in a run."""
+    return specimen.tensile is not None or specimen.simulation.moduli.startswith("run:")
+
+
+def _stopped(specimen: Specimen) -> bool:
+    """Whether the blocked force is there already down to where the muscle stops pulling."""
+    blocked = specimen.blocked_force
+    if blocked is None:
+        return False
+    slack = blocked.censored | (blocked.force_N < STOPS * blocked.force_N.max(initial=0.0))
+    return bool(np.any(slack))
+
+
+def _static(specimen: Specimen) -> bool:
+    """Whether there is no loop that could be repeated."""
+    return specimen.loops is None
+
+
+INSTEAD: Final[dict[str, tuple[Callable[[Specimen], bool], str]]] = {
+    "order_too_low": (_tested, "the tensile test, fitted at a higher order and at the muscle's strains"),
+    "dead_band": (_stopped, "more readings of the blocked force about where the muscle stops pulling"),
+    "pressure_droop": (_static, "a pressure sensor at the muscle itself"),
+}
+"""What shows an effect where the measurement that does it usually was made already, or cannot be."""
 
 
 def shown_by(identifier: str, specimen: Specimen) -> str:
     """The measurement that would show an effect, "" where none is known."""
-    tested = specimen.tensile is not None or specimen.simulation.moduli.startswith("run:")
-    if tested and identifier in TESTED:
-        return TESTED[identifier]
+    if identifier in INSTEAD:
+        needed, words = INSTEAD[identifier]
+        if needed(specimen):
+            return words
     return effect(identifier).told_by
 
 

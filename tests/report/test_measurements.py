@@ -6,6 +6,7 @@ import re
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from mpam_calib.model.effect import effect
@@ -55,3 +56,21 @@ def test_a_tensile_test_is_asked_for_where_there_is_none(test: object, moduli: s
 def test_another_speed_is_asked_for_however_many_there_are() -> None:
     """One is too few to test for the speed; three may be there already."""
     assert not re.search("second|third", effect("rate_friction").told_by)
+
+
+@pytest.mark.parametrize(
+    ("forces", "stopped"), [(None, False), ([8.0, 40.0], False), ([0.4, 8.0, 40.0], True)]
+)
+def test_blocked_forces_down_to_nothing_are_asked_for_once(forces: list[float] | None, stopped: bool) -> None:
+    pulls = None if forces is None else np.array(forces)
+    readings = None if pulls is None else SimpleNamespace(force_N=pulls, censored=pulls < 0.0)
+    specimen: Any = SimpleNamespace(blocked_force=readings)
+    asked = shown_by("dead_band", specimen)
+    assert (asked == effect("dead_band").told_by) != stopped
+    assert asked.startswith("more readings of the blocked force") == stopped
+
+
+@pytest.mark.parametrize("loops", [None, object()])
+def test_no_loop_is_to_be_repeated_where_there_is_none(loops: object) -> None:
+    specimen: Any = SimpleNamespace(loops=loops)
+    assert ("the same loop" in shown_by("pressure_droop", specimen)) == (loops is not None)
