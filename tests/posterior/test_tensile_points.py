@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from model import build
 from numpy.typing import NDArray
+from scipy import signal
 
 from mpam_calib.calibration import calibrate
 from mpam_calib.posterior.draws import reported
@@ -86,6 +87,36 @@ def test_rows_that_differ_by_noise_alone_all_count() -> None:
     for rows in (400, 2000):
         assert gather_tensile(pieces(rows, 0.0), 0.0, 2.0).rows > 0.8 * 2 * rows
     assert first_sd(pieces(2000, 0.0)) < 0.7 * first_sd(pieces(200, 0.0))
+
+
+def slow_noise(rows: int, time: float, seed: int) -> Array:
+    """Noise of size 1, correlated over ``time`` rows."""
+    rng = np.random.default_rng(seed)
+    fresh, a = rng.standard_normal(rows), np.exp(-1.0 / time)
+    start = np.full(1, a * rng.standard_normal())
+    return np.asarray(signal.lfilter([np.sqrt(1.0 - a**2)], [1.0, -a], fresh, zi=start)[0])
+
+
+@pytest.mark.parametrize(("rows", "time"), [(1000, 3.0), (1000, 10.0), (2000, 20.0)])
+def test_slow_noise_counts_as_the_few_readings_that_it_is(rows: int, time: float) -> None:
+    """Also the slowest part of it, which a smooth curve through the rows takes along."""
+    strain = np.linspace(0.01, 1.5, rows)
+    stress = strain[:, None] ** np.arange(1, 3) @ MODULI
+    tests = [Tensile(strain, stress + NOISE * slow_noise(rows, time, seed)) for seed in range(20)]
+    worth = np.median([gather_tensile(test, 0.0, 2.0).rows for test in tests])
+    assert worth == pytest.approx(rows / (2.0 * time), rel=0.3)
+
+
+def test_bands_hold_the_law_under_slow_noise() -> None:
+    inside = []
+    for seed in range(4):
+        strain = np.linspace(0.01, 1.5, 1000)
+        stress = strain[:, None] ** np.arange(1, 3) @ MODULI + 3.0 * NOISE * slow_noise(1000, 10.0, seed)
+        bands = calibrate(rubber(Tensile(strain, stress)), seed=seed).bands()
+        bands = bands[bands["quantity"] == "stress_Pa"]
+        true = bands["contraction"].to_numpy()[:, None] ** np.arange(1, 3) @ MODULI
+        inside.append(np.mean((true >= bands["q05"]) & (true <= bands["q95"])))
+    assert np.mean(inside) > 0.75
 
 
 @pytest.mark.parametrize(("count", "rows"), [(3, 40), (5, 300)])

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
+from mpam_calib.posterior.likelihood.likeness import autocorrelation_time, hidden_time
 from mpam_calib.specimen.recording import Tensile
 
 Array = NDArray[np.float64]
@@ -83,8 +83,8 @@ def _grouped(e: Array, s: Array) -> TensilePoints:
 def _counted(points: TensilePoints, alike: float) -> TensilePoints:
     """The points where each row says as much as one in ``alike``.
 
-    Pieces that differ, and a way back, leave residuals that go on from row to row: more rows of the same
-    pieces then tell no more of the law, though each scatters as before.
+    Pieces that differ, a way back, and a load cell whose noise is slow leave residuals that go on from row to
+    row: more rows of the same pieces then tell no more of the law, though each scatters as before.
     """
     rows = min(max(points.rows / alike, FEWEST), points.rows)
     share = rows / points.rows if rows else 1.0
@@ -92,10 +92,7 @@ def _counted(points: TensilePoints, alike: float) -> TensilePoints:
 
 
 def _alike(points: TensilePoints, strain: Array, stress: Array) -> float:
-    """Integrated autocorrelation time, at least 1, of the rows (N,) in their order, about a smooth curve.
-
-    Geyer's initial positive sequence (1992, doi:10.1214/ss/1177011137).
-    """
+    """Integrated autocorrelation time, at least 1, of the rows (N,) in their order, about a smooth curve."""
     if (degree := min(DEGREE, len(strain) // ROWS_EACH)) < 1:
         return 1.0
     centre, half = 0.5 * float(strain.max() + strain.min()), 0.5 * float(np.ptp(strain)) or 1.0
@@ -103,11 +100,6 @@ def _alike(points: TensilePoints, strain: Array, stress: Array) -> float:
     waves = np.polynomial.chebyshev.chebvander((points.strain - centre) / half, degree)
     curve = np.linalg.lstsq(weight[:, None] * waves, weight * points.stress, rcond=None)[0]
     left = stress - np.polynomial.chebyshev.chebval((strain - centre) / half, curve)
-    n = len(left)
-    padded = fft.next_fast_len(2 * n, real=True)
-    covariance = fft.irfft(np.abs(fft.rfft(left, n=padded)) ** 2, n=padded)[:n]
     if np.sum(left**2) <= QUIET**2 * np.sum(stress**2):
         return 1.0
-    pairs = (covariance[: n - n % 2].reshape(-1, 2) / covariance[0]).sum(axis=1)
-    kept = int(np.argmax(pairs <= 0.0)) if (pairs <= 0.0).any() else len(pairs)
-    return max(2.0 * float(pairs[:kept].sum()) - 1.0, 1.0)
+    return max(autocorrelation_time(left), hidden_time(left, degree))
