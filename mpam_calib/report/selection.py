@@ -204,7 +204,7 @@ def selection_page(found: Selection, specimen: Specimen, material: MaterialPoste
             ],
         ),
         choices_section(found.odds, found.levels),
-        _sensitivity_section(found, names),
+        _sensitivity_section(found, names, prior_of_moduli(specimen)),
     ]
     if found.replicates:
         sections.append(_confusion_section(found, names, recorded(specimen)))
@@ -251,8 +251,18 @@ def first_under(winners: list[str], first: str) -> str:
     return f"Which model is first depends on them: {'; '.join(each)}."
 
 
-def _sensitivity_section(found: Selection, names: list[str]) -> Section:
-    """Shares among the leading models under other prior widths."""
+def prior_of_moduli(specimen: Specimen) -> str:
+    """What the prior of the moduli is, whose width is halved and doubled."""
+    moduli = specimen.simulation.moduli
+    if moduli == "loops":
+        return "stated in newtons"
+    if moduli == "tensile":
+        return "what the tensile test gives" if specimen.tensile is not None else "E_rel_sd"
+    return "what the material's run gives"
+
+
+def _sensitivity_section(found: Selection, names: list[str], of_moduli: str) -> Section:
+    """Shares among the leading models under other prior widths; ``of_moduli`` says what the moduli's is."""
     shares = found.sensitivity.pivot_table(index="model", columns="prior", values="probability")
     shares = shares[list(dict.fromkeys(found.sensitivity["prior"]))].reset_index(drop=True)
     winners = shares.to_numpy().argmax(axis=0)
@@ -264,7 +274,7 @@ def _sensitivity_section(found: Selection, names: list[str]) -> Section:
         [
             Text(
                 "Evidence weighs a model by what its prior thought possible. Here the widths of the priors "
-                "are halved and doubled: of the moduli (stated in newtons), and of all other parameters. "
+                f"are halved and doubled: of the moduli ({of_moduli}), and of all other parameters. "
                 + first_under([names[int(i)] for i in winners], names[0])
             ),
             DataTable(shares, "Shares among the leading models", formats),

@@ -17,9 +17,15 @@ from mpam_calib.model.blueprint import MaterialPosterior
 from mpam_calib.report.blocks import DataTable, Headline, Notice, Text, Verdict
 from mpam_calib.report.choices import choice_sentences, choices_section, level_sentence
 from mpam_calib.report.page import Page
-from mpam_calib.report.selection import evidence_text, ranking_table, selection_page, selection_sentence
+from mpam_calib.report.selection import (
+    evidence_text,
+    prior_of_moduli,
+    ranking_table,
+    selection_page,
+    selection_sentence,
+)
 from mpam_calib.specimen.declaration import GeometrySd, Sensors
-from mpam_calib.specimen.recording import ForceMap, FreeContraction, Specimen
+from mpam_calib.specimen.recording import ForceMap, FreeContraction, Specimen, Tensile
 
 SPECIMEN = specimen_of("develop-null-006")
 
@@ -35,6 +41,29 @@ def test_moduli_of_another_run_have_their_page() -> None:
         models(UNKNOWN, UNKNOWN), specimen=replace(SPECIMEN, simulation=simulation), material=MATERIAL
     )
     assert any(isinstance(block, Headline) for block in told.lead)
+
+
+@pytest.mark.parametrize(
+    ("changed", "tested", "said"),
+    [
+        ({"moduli": "loops"}, False, "(stated in newtons)"),
+        ({"moduli": "tensile"}, True, "(what the tensile test gives)"),
+        ({"moduli": "tensile", "E_Pa": (4e4,), "E_rel_sd": 0.1}, False, "(E_rel_sd)"),
+        ({"moduli": "run:../material"}, False, "(what the material's run gives)"),
+    ],
+)
+def test_the_prior_that_is_widened_is_that_of_the_declared_moduli(
+    changed: dict[str, Any], tested: bool, said: str
+) -> None:
+    simulation = SPECIMEN.simulation.model_copy(update=changed)
+    test = Tensile(np.array([0.1, 0.2]), np.array([4e3, 8e3])) if tested else None
+    assert said == f"({prior_of_moduli(replace(SPECIMEN, simulation=simulation, tensile=test))})"
+    if not tested:
+        specimen = replace(SPECIMEN, simulation=simulation)
+        material = MATERIAL if simulation.moduli.startswith("run:") else None
+        told = page(models(UNKNOWN, UNKNOWN), specimen=specimen, material=material)
+        (section,) = (s for s in told.sections if "priors" in s.title)
+        assert any(isinstance(b, Text) and said in str(b.html) for b in section.blocks)
 
 
 def models(*held: tuple[float, float]) -> pd.DataFrame:
