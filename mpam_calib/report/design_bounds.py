@@ -16,6 +16,8 @@ RATIO, RATIO_MARK = "V_bl/V", "†"
 """The constraint that keeps a wall from being thinner: it marks the wall's thickness."""
 HAIR = 1e-9
 """Share of a bound's range by which rounding may pass it."""
+MOST = 10
+"""Digits of a value at most."""
 
 
 def _span(variable: Variable) -> str:
@@ -43,11 +45,19 @@ def beyond_bounds(geometry: Geometry) -> str:
     for variable, value in zip(WALL, (geometry.R0, geometry.t0, geometry.alpha0), strict=True):
         hair = HAIR * (variable.upper - variable.lower)
         if not variable.lower - hair <= value <= variable.upper + hair:
-            found.append(f"{variable.symbol} = {value / variable.scale:.4g}{_unit(variable)}")
+            ends = variable.lower / variable.scale, variable.upper / variable.scale
+            found.append(f"{variable.symbol} = {_apart(value / variable.scale, 4, *ends)}{_unit(variable)}")
     ratio = float(volume_ratio(np.array(geometry.R0), np.array(geometry.t0)))
     if ratio < RATIO_LOW - HAIR:
-        found.append(f"V_bl/V = {ratio:.2g}")
+        found.append(f"V_bl/V = {_apart(ratio, 2, RATIO_LOW)}")
     return ", ".join(found)
+
+
+def _apart(value: float, digits: int, *ends: float) -> str:
+    """A value that lies outside a bound, with digits enough to see that it does."""
+    while digits < MOST and float(f"{value:.{digits}g}") in [float(f"{end:.{digits}g}") for end in ends]:
+        digits += 1
+    return f"{value:.{digits}g}"
 
 
 def marks(held_by: Sequence[str]) -> dict[str, str]:

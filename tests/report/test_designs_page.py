@@ -129,6 +129,12 @@ def test_a_muscle_at_the_bounds_lies_within_them() -> None:
     assert beyond_bounds(flat) == "α = 30°"
 
 
+def test_a_muscle_just_outside_a_bound_is_told_with_digits_enough_to_see_it() -> None:
+    """V_bl/V of 0.399 was said to lie outside "at least 0.4" as 0.4."""
+    near = Geometry(L0_mm=80.0, R0_mm=4.0, t0_mm=0.9, alpha0_deg=72.003)
+    assert beyond_bounds(near) == "R = 4 mm, α = 72.003°, V_bl/V = 0.399"
+
+
 @pytest.mark.parametrize(("geometry", "there"), [(THESIS, True), (LARGE, False)])
 def test_table_3_5_is_shown_beside_the_thesiss_own_muscle_alone(geometry: Geometry, there: bool) -> None:
     shown = page(geometry)
