@@ -38,7 +38,7 @@ def tensile_lead(view: CalibrationView) -> list[Block]:
     if (first := first_modulus(view)) is not None:
         value, band = row_with_band(first, 1e-3)
         engineering = view.simulation.strain == "engineering"
-        hint = "slope at small strain" if engineering else "a coefficient in the stretch, not a slope"
+        hint = "the law's slope at no strain" if engineering else "a coefficient in the stretch, not a slope"
         cards.append(KeyNumber("First modulus E_1", value, "kPa", f"90 % band: {band} kPa", hint))
     name = view.material or view.name
     sentence = Markup("Stretched, {} carries {}.").format(name, Markup(" and ").join(parts))
@@ -92,7 +92,17 @@ def _range_section(view: CalibrationView) -> Section:
             ),
         ],
         "A polynomial fitted to large strains can be wrong at the small ones that a muscle's bladder sees, "
-        "and the other way round. Choose the range that the bladder sees.",
+        "and the other way round. Choose the range that the bladder sees." + _slope(view),
+    )
+
+
+def _slope(view: CalibrationView) -> str:
+    """What E_1 is where the law misses: its band holds the polynomial's slope, not the rubber's."""
+    if view.simulation.strain != "engineering":
+        return ""
+    return (
+        " E_1 is the slope at no strain of the polynomial, and its band is that slope's: where it moves with "
+        "the range, the rubber's own slope at small strains lies elsewhere."
     )
 
 

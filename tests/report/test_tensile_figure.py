@@ -46,4 +46,4 @@ def test_a_polynomial_in_the_stretch_has_no_slope_for_a_first_coefficient(strain
     simulation = view.simulation.model_copy(update={"strain": strain})
     numbers = next(b for b in tensile_lead(replace(view, simulation=simulation)) if isinstance(b, Numbers))
     (card,) = (card for card in numbers.items if card.label == "First modulus E_1")
-    assert (card.note == "slope at small strain") == slope
+    assert (card.note == "the law's slope at no strain") == slope
