@@ -27,7 +27,10 @@ CHOICES = [*NAMED, "effects"]
 MEASURED = 4e-4
 """Nats to which the rules of integration were measured: what their own errors say below is not to be had."""
 FIGURES = ("probability", "n", "log evidence", "error (N)", "density (nats)")
-RANKING = "Best first. n: parameters; error and log density: of pressure levels that were held out."
+RANKING = (
+    "Best first. n: parameters; error and log density: of pressure levels that were held out (of loops: the "
+    "means of neighbouring readings, which scatter less than single ones)."
+)
 ASSUMED_NOISE = (
     "Noise of a reading: {} N, assumed. No force_sd_N is declared and the force map has too few readings to "
     "tell it; this is what all models together make of it, from 0.3 % of the force scale within a factor of "

@@ -292,3 +292,10 @@ def test_low_levels_keep_their_decimals_and_nothing_is_extrapolated_where_no_lev
     choices = odds(models(UNKNOWN), SPECIMEN.simulation)
     (table,) = (b for b in choices_section(choices, levels).blocks if isinstance(b, DataTable))
     assert [row[1] for row in table.rows] == ["2.5", "50"]
+
+
+def test_errors_at_levels_held_out_are_told_to_be_of_means() -> None:
+    """Beside a load cell's noise they would look too small otherwise."""
+    told = page(models((-100.0, 1.0), (-110.0, 1.0)))
+    (table,) = (b for b in told.sections[0].blocks if isinstance(b, DataTable))
+    assert "means of neighbouring readings" in table.caption
