@@ -21,6 +21,7 @@ from mpam_calib.report import wording
 from mpam_calib.report.blocks import Block, DataTable, Figure, Section, Text
 from mpam_calib.report.diagnosis_lead import HELD_OUT, first_screen
 from mpam_calib.report.figures import misfit
+from mpam_calib.report.figures.misfit import Floats
 from mpam_calib.report.measurements import not_tested, shown_by, telling
 from mpam_calib.report.numbers import probability, significant, with_band
 from mpam_calib.report.page import Page
@@ -33,6 +34,11 @@ LIMITED = ("adequate", "named")
 SETTLED = 0.95
 """Probability above which a cause's equation is not said to be open."""
 
+
+SHARED = (
+    "The bar of a cause is the root of its Shapley share of the squared misfit: what either of two could "
+    "explain by itself is shared between them, however small one is beside the other."
+)
 
 FORMS = (
     "These probabilities suppose that a rig's effects follow the catalogue's equations, bent ones too, "
@@ -125,17 +131,24 @@ def _budget(found: Diagnosis, content: dict[str, Any]) -> list[Block]:
     return [
         Figure(
             misfit.budget([*names, "still unexplained"], [*newtons, left], content["noise_N"]),
-            "The bar of a cause is the root of its Shapley share of the squared misfit: what either of two "
-            "could explain by itself is shared between them, however small one is beside the other.",
+            SHARED if names else "What the declared simulation leaves, refitted, beside a reading's noise.",
             "Bars of the newtons that each cause explains",
         ),
         Figure(
             maps,
-            "Reduced readings minus the refitted simulation; grey: twice the noise of a reduced reading. "
-            "Triangles up: loading, down: unloading.",
+            "Reduced readings minus the refitted simulation; grey: twice the noise of a reduced reading."
+            + _markers(middle.sign),
             f"Residuals: {', '.join(shown)}",
         ),
     ]
+
+
+def _markers(sign: Floats) -> str:
+    """What the markers of readings with such directions mean: a force map may have none."""
+    moving, still = np.any(sign != 0.0), np.any(sign == 0.0)
+    return (
+        f" Triangles up: loading, down: unloading{'; circles: neither' if still else ''}." if moving else ""
+    )
 
 
 def _compared(found: Diagnosis) -> dict[str, frozenset[str]]:

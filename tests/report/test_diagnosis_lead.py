@@ -12,7 +12,7 @@ from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.unexplained.load_cell import FAULT
 from mpam_calib.report.blocks import Figure, Headline, Verdict
-from mpam_calib.report.diagnosis import _budget, _compared
+from mpam_calib.report.diagnosis import _budget, _compared, _markers
 from mpam_calib.report.diagnosis_lead import first_screen
 from mpam_calib.report.figures.misfit import residual_maps
 
@@ -112,8 +112,8 @@ def test_residuals_are_drawn_of_what_their_titles_say(
     assert last == ["9 kPa", "5 kPa"]  # which colour is which level
 
 
-def test_newtons_that_two_causes_share_are_told_as_shared() -> None:
-    """A braid angle of hundredths of a degree has two fifths of a creep's, as it could stand in for it."""
+def test_captions_say_what_the_figures_show() -> None:
+    """Bars of causes only where there are any, and the markers that are drawn."""
     problem = problem_of(specimen_of("develop-null-006"))
     none = frozenset[str]()
     found: Any = SimpleNamespace(
@@ -121,6 +121,12 @@ def test_newtons_that_two_causes_share_are_told_as_shared() -> None:
         search=SimpleNamespace(fits={(none, 0): fit(problem, none, 0)}),
         verdict=SimpleNamespace(standing=none, leading=none),
     )
-    bars, _ = _budget(found, CONTENT)
-    assert isinstance(bars, Figure)
-    assert "what either of two could explain by itself is shared between them" in bars.caption
+    cause = {"id": "creep", "share_of_misfit": 0.6}
+    for causes in ([], [cause]):
+        bars, residuals = _budget(found, CONTENT | {"causes": causes})
+        assert isinstance(bars, Figure) and isinstance(residuals, Figure)
+        # A tiny braid angle may have two fifths of a creep's newtons, as it could stand in for it.
+        assert ("what either of two could explain by itself is shared" in bars.caption) == bool(causes)
+        assert residuals.caption.endswith(" Triangles up: loading, down: unloading.")
+    assert _markers(np.array([1.0, 0.0])).endswith("circles: neither.")
+    assert _markers(np.zeros(3)) == ""
