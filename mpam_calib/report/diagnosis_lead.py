@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any, Literal
 
@@ -37,6 +38,9 @@ PARTLY_UNDECIDED = (
     "at fault."
 )
 CELL = "A load cell at fault explains these data better than any known set of causes does."
+MORE = (
+    "The declared simulation is wrong, and these data cannot tell whether more is wrong than is named here."
+)
 DOUBTED = "No fault is shown beyond doubt, but {}: see “What else could it be”."
 
 HELD_OUT = {"cycle": "cycles", "pressure": "pressure levels"}
@@ -86,6 +90,8 @@ def _headline(content: dict[str, Any]) -> str:
     word = content["verdict"]
     if word == "adequate" and (rival := _likelier(content)):
         return DOUBTED.format(_rivalry(rival, content["probability"]))
+    if word == "ambiguous" and _all_in_every_rival(content):
+        return MORE
     if word == "unexplained" and only_recording(content):
         return RECORDING.format(_sure_of_fault(content))
     if word == "unexplained" and _undecided(content):
@@ -93,6 +99,14 @@ def _headline(content: dict[str, Any]) -> str:
             return CELL
         return PARTLY_UNDECIDED if content["causes"] else UNDECIDED
     return SENTENCES[word]
+
+
+def _all_in_every_rival(content: dict[str, Any]) -> bool:
+    """Whether all that keeps the causes from being named are sets that hold them, too, and more."""
+    causes = {c["id"] for c in content["causes"]}
+    least = content["probability"] * math.exp(-LEAD)
+    rivals = [set(a["ids"]) for a in content["alternatives"] if a["probability"] >= least]
+    return bool(rivals) and all(causes <= rival for rival in rivals)
 
 
 def _undecided(content: dict[str, Any]) -> bool:

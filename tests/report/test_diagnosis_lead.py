@@ -130,3 +130,28 @@ def test_captions_say_what_the_figures_show() -> None:
         assert residuals.caption.endswith(" Triangles up: loading, down: unloading.")
     assert _markers(np.array([1.0, 0.0])).endswith("circles: neither.")
     assert _markers(np.zeros(3)) == ""
+
+
+@pytest.mark.parametrize(
+    ("rivals", "more"),
+    [
+        ([(["creep", "force_drift"], 0.007), (["dead_band"], 1e-6)], True),
+        ([(["creep", "force_drift"], 0.007), (["dead_band"], 0.008)], False),
+        ([(["creep"], 0.3), (["dead_band"], 0.1)], False),
+        ([(["creep", "force_drift"], 0.001)], False),  # many of these, all far behind
+    ],
+)
+def test_causes_that_every_rival_holds_are_not_said_to_be_confused(
+    rivals: list[tuple[list[str], float]], more: bool
+) -> None:
+    """What no rival is without, and another that may be there as well, are not several of which one is."""
+    content = CONTENT | {
+        "verdict": "ambiguous",
+        "causes": [CREEP] if rivals[0][0] != ["creep"] else [CREEP, CREEP | {"id": "braid_angle"}],
+        "probability": 0.98,
+        "alternatives": [{"ids": ids, "probability": p} for ids, p in rivals],
+    }
+    headline = first_screen(content, specimen_of("develop-null-006"))[0]
+    assert isinstance(headline, Headline)
+    assert ("whether more is wrong than is named" in headline.html) == more
+    assert ("cannot tell several causes apart" in headline.html) != more
