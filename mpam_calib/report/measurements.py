@@ -42,6 +42,9 @@ INSTEAD: Final[dict[str, tuple[Callable[[Specimen], bool], str]]] = {
 }
 """What shows an effect where the measurement that does it usually was made already, or cannot be."""
 
+STAND_IN: Final = "If one of these is there, what it does may have been put down to another cause."
+"""At one level a dead-band is as good as a braid angle, and the angle alone is tested."""
+
 
 def shown_by(identifier: str, specimen: Specimen) -> str:
     """The measurement that would show an effect, "" where none is known."""
@@ -70,4 +73,5 @@ def not_tested(content: dict[str, Any], specimen: Specimen) -> list[Block]:
         }
         for n in content["not_tested"]
     ]
-    return [DataTable(pd.DataFrame(rows), "Effects that these data are silent on", None)]
+    table = DataTable(pd.DataFrame(rows), "Effects that these data are silent on", None)
+    return [Text(STAND_IN), table] if content["verdict"] != "adequate" else [table]

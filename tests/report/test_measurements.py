@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from mpam_calib.model.effect import effect
-from mpam_calib.report.blocks import Block, DataTable
+from mpam_calib.report.blocks import Block, DataTable, Text
 from mpam_calib.report.diagnosis import _alternatives, _limits
-from mpam_calib.report.measurements import not_tested, shown_by, telling
+from mpam_calib.report.measurements import STAND_IN, not_tested, shown_by, telling
 
 ORDER = "order_too_low"
 TEST = effect(ORDER).told_by
@@ -36,6 +36,7 @@ def test_a_tensile_test_is_asked_for_where_there_is_none(test: object, moduli: s
     assert telling(set(), {"creep", ORDER}, specimen) == effect("creep").told_by
     assert telling(set(), set(), specimen) == ""
     content: dict[str, Any] = {
+        "verdict": "ambiguous",
         "causes": [],
         "alternatives": [{"ids": [ORDER], "probability": 0.1}],
         "not_tested": [{"id": ORDER, "why": "one level"}],
@@ -74,3 +75,13 @@ def test_blocked_forces_down_to_nothing_are_asked_for_once(forces: list[float] |
 def test_no_loop_is_to_be_repeated_where_there_is_none(loops: object) -> None:
     specimen: Any = SimpleNamespace(loops=loops)
     assert ("the same loop" in shown_by("pressure_droop", specimen)) == (loops is not None)
+
+
+@pytest.mark.parametrize("verdict", ["adequate", "named", "ambiguous", "unexplained"])
+def test_a_cause_may_stand_in_for_one_that_is_not_tested(verdict: str) -> None:
+    specimen: Any = SimpleNamespace(blocked_force=None)
+    silent = [{"id": "dead_band", "why": "1 pressure level"}]
+    blocks = not_tested({"verdict": verdict, "not_tested": silent}, specimen)
+    assert isinstance(blocks[-1], DataTable)
+    told = [b.html for b in blocks if isinstance(b, Text)]
+    assert told == ([] if verdict == "adequate" else [STAND_IN])
