@@ -53,6 +53,10 @@ BENT = (
 )
 
 
+TIMES_BENDS = ", before its bends"
+"""A size of a few thousandths may be bent to several hundredths."""
+
+
 def diagnosis_page(found: Diagnosis, content: dict[str, Any], specimen: Specimen) -> Page:
     """The page for one diagnosis; ``content`` is that of ``diagnosis.json``."""
     causes, parameters, tested = content["causes"], _parameters(found), found.candidates.tested
@@ -187,7 +191,8 @@ def _causes(causes: list[dict[str, Any]], parameters: dict[str, Parameter]) -> l
             name,
             *with_band(values["mean"], values["q05"], values["q95"]),
             parameters[name].printed_unit,
-            parameters[name].meaning,
+            parameters[name].meaning
+            + (TIMES_BENDS if not is_bend(name) and any(map(is_bend, c["parameters"])) else ""),
         )
         for c in causes
         for number, (name, values) in enumerate(c["parameters"].items())

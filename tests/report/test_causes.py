@@ -92,6 +92,9 @@ def test_a_cause_states_its_probability_once_and_warns_of_bends(form: str) -> No
     assert [row[:3] for row in told.rows] == [["Creep", "0.98", "0.7"]]
     assert len(sized.rows) == len(parameters) > (form == "bent")
     assert [row[1:4] for row in sized.rows] == [[name, "0.100", "0.080–0.120"] for name in parameters]
+    assert [row[-1].endswith(", before its bends") for row in sized.rows] == [
+        form == "bent" and number == 0 for number in range(len(parameters))
+    ]
 
 
 def test_a_cause_without_a_size_is_told_all_the_same() -> None:
