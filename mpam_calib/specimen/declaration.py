@@ -186,6 +186,9 @@ class Fit(Table):
     def _rising(cls, value: tuple[float, float] | None) -> tuple[float, float] | None:
         if value is not None and value[0] >= value[1]:
             raise ValueError(f"[{value[0]:g}, {value[1]:g}]|the lower strain before the higher one")
+        if value is not None and value[0] <= -1.0:
+            # At -1 nothing is left of the test piece; bands would go on beyond it.
+            raise ValueError(f"[{value[0]:g}, {value[1]:g}]|strains above -1")
         return value
 
 

@@ -328,6 +328,10 @@ CASES: dict[str, tuple[Spoil, list[str]]] = {
         ["both E_Pa and a tensile file"],
     ),
     "E_Pa with free moduli": (append("E_Pa = [4e4]\n"), ['E_Pa with moduli = "loops"']),
+    "strain range of less than nothing": (
+        append("[fit]\ntensile_strain = [-1.5, 0.5]\n"),
+        ["[-1.5, 0.5], expected strains above -1"],
+    ),
     "strain range upside down": (append("[fit]\ntensile_strain = [3.0, 0.1]\n"), ["[3, 0.1]"]),
     "strain range of one": (
         append("[fit]\ntensile_strain = [0.1]\n"),
