@@ -22,21 +22,27 @@ def parameters() -> dict[str, Parameter]:
     return {p.name: p for e in IDS for p in effect(e).parameters(setting)}
 
 
-@pytest.mark.parametrize(("low", "named"), [(0.1, True), (-0.1, False)])
-def test_a_band_of_either_sign_that_excludes_zero_is_pointed_out(
-    parameters: dict[str, Parameter], low: float, named: bool
-) -> None:
+def told_of(parameters: dict[str, Parameter], low: float, high: float) -> Text:
+    """What the page says of an offset with these ends, beside a fixture that may give a little."""
     offset, compliance = parameters
     content: dict[str, Any] = {
         "causes": [],
         "not_tested": [],
         "limits": [
-            {"id": "length_offset", "parameters": {offset: {"q05": low, "q95": 0.3}}},
+            {"id": "length_offset", "parameters": {offset: {"q05": low, "q95": high}}},
             {"id": "rig_compliance", "parameters": {compliance: {"q05": 1e-6, "q95": 1e-4}}},
         ],
     }
     text = _limits(content, parameters, specimen_of("develop-null-006"))[0]
     assert isinstance(text, Text)
+    return text
+
+
+@pytest.mark.parametrize(("low", "named"), [(0.1, True), (-0.1, False)])
+def test_a_band_of_either_sign_that_excludes_zero_is_pointed_out(
+    parameters: dict[str, Parameter], low: float, named: bool
+) -> None:
+    text = told_of(parameters, low, 0.3)
     assert ("length offset" in text.html) == named
     assert "compliance" not in text.html
     # "Adequate" may stand beside a likelier cause: nothing is shown, but something was found.
@@ -48,17 +54,7 @@ def test_a_band_of_either_sign_that_excludes_zero_is_pointed_out(
 def test_an_effect_that_the_data_have_no_room_for_is_told_from_one_that_may_hide(
     parameters: dict[str, Parameter],
 ) -> None:
-    offset, compliance = parameters
-    content: dict[str, Any] = {
-        "causes": [],
-        "not_tested": [],
-        "limits": [
-            {"id": "length_offset", "parameters": {offset: {"q05": 0.0, "q95": 0.0}}},
-            {"id": "rig_compliance", "parameters": {compliance: {"q05": 1e-6, "q95": 1e-4}}},
-        ],
-    }
-    text = _limits(content, parameters, specimen_of("develop-null-006"))[0]
-    assert isinstance(text, Text)
+    text = told_of(parameters, 0.0, 0.0)
     assert "no room for any size of: length offset." in text.html
     assert "exclude zero" not in text.html
 
