@@ -25,7 +25,8 @@ def past(view: CalibrationView) -> Limit | None:
         return None
     lie = f"lie {significant(abs(off), 2)} N {'above' if off > 0.0 else 'below'}"
     readings = f"the readings of this test at {view.top_level_kPa:.4g} kPa"
-    if all(effect(name).stage is not Stage.HISTORY for name in view.simulation.effects):
+    stages = {effect(name).stage for name in view.simulation.effects}
+    if Stage.SENSOR in stages and Stage.HISTORY not in stages:
         brief = f"{readings} {lie} on average for a load cell that wandered"
         return Limit("good", f"T{brief[1:]}: these numbers are without that.", brief)
     sentence = (

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from run.command import Here, Result
 from specimen.folders import DECLARATION, loops, make
 
 from mpam_calib.cli import main
@@ -306,14 +307,6 @@ def test_an_empty_word_is_no_folder(
     make(tmp_path / "specimen", DECLARATION, loops=loops().text())
     before = sorted(tmp_path.rglob("*"))
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", ["mpam-calib", *words])
-    ctrl_c = signal.getsignal(signal.SIGINT)
-    try:
-        with pytest.raises(SystemExit) as end:
-            main()
-    finally:
-        signal.signal(signal.SIGINT, ctrl_c)
-    assert end.value.code == 2
-    told = capsys.readouterr()
-    assert (told.out, told.err) == ("", f"error: {place}: found an empty word, expected a name or a value\n")
+    told = Here(capsys, monkeypatch)(*words)
+    assert told == Result(2, "", f"error: {place}: found an empty word, expected a name or a value\n")
     assert sorted(tmp_path.rglob("*")) == before

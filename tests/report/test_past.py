@@ -31,6 +31,7 @@ def off(view: CalibrationView, effects: tuple[str, ...], **branch_N: float) -> C
         (("creep",), -12.0, -8.0, "caution"),
         (("stress_softening:power", "force_drift"), 12.0, 8.0, "caution"),
         (("force_drift",), 12.0, 8.0, "good"),
+        (("presliding",), 12.0, 8.0, "caution"),  # no load cell that wanders is declared
         (("creep",), 0.4, 0.4, None),  # within the band
         (("presliding",), -10.0, 10.0, None),  # what one branch loses the other gains
     ],
