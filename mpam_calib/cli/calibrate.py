@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from mpam_calib.cli import NOT_CONVERGED
 from mpam_calib.cli.app import app
+from mpam_calib.cli.arguments import AnySeed, RunToWrite, SpecimenPath
+from mpam_calib.cli.telling import tell_page
 
 
 @app.command()
 def calibrate(
-    specimen: Annotated[
-        Path, typer.Argument(metavar="SPECIMEN", help="Specimen folder, or its specimen.toml.")
-    ],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="RUN", help="Folder to write, resume or keep.")
-    ],
-    seed: Annotated[int, typer.Option(help="Seed of every random choice.", min=0)] = 0,
+    specimen: SpecimenPath,
+    output: RunToWrite,
+    seed: AnySeed = 0,
     max_steps: Annotated[int, typer.Option(help="Budget: sampling steps of each ensemble.", min=1)] = 4000,
     ess: Annotated[float, typer.Option(help="Effective draws wanted of every parameter.", min=1)] = 400.0,
     remainder: Annotated[
@@ -53,8 +50,7 @@ def calibrate(
             options=options,
             listener=listener,
         )
-    what = "kept (same data, model and options)" if outcome.kept else "written"
-    print(f"{output / 'report.html'} {what}")
+    tell_page(output, kept=outcome.kept)
     if not outcome.converged:
         print("not converged within the budget: see run.json; a larger --max-steps resumes")
         raise typer.Exit(NOT_CONVERGED)

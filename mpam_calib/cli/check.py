@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from mpam_calib.cli.app import app
+from mpam_calib.cli.arguments import SpecimenPath
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -20,9 +18,7 @@ if TYPE_CHECKING:
 
 @app.command()
 def check(
-    specimen: Annotated[
-        Path, typer.Argument(metavar="SPECIMEN", help="Specimen folder, or its specimen.toml.")
-    ],
+    specimen: SpecimenPath,
 ) -> None:
     """Print what was read: rows, levels, cycles, branches, speeds, what is missing, what looks odd."""
     from rich.console import Console

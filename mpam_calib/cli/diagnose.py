@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from mpam_calib.cli.app import app
+from mpam_calib.cli.arguments import AnySeed, RunToWrite, SpecimenPath
+from mpam_calib.cli.telling import tell_page
 
 
 @app.command()
 def diagnose(
-    specimen: Annotated[
-        Path, typer.Argument(metavar="SPECIMEN", help="specimen folder or its specimen.toml")
-    ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="RUN", help="the RUN folder to write")],
-    seed: Annotated[int, typer.Option(help="seed of every random choice", min=0)] = 0,
+    specimen: SpecimenPath,
+    output: RunToWrite,
+    seed: AnySeed = 0,
 ) -> None:
     """Show what the declared simulation gets wrong, name the cause, extend the model, measure the gain.
 
@@ -33,4 +29,4 @@ def diagnose(
     said = json.loads((output / "diagnosis.json").read_text(encoding="utf-8"))
     causes = ", ".join(cause["id"] for cause in said["causes"])
     print(f"{said['verdict']}{': ' + causes if causes else ''}")
-    print(f"{output / 'report.html'} {'written' if found else 'kept (same data, model and options)'}")
+    tell_page(output, kept=found is None)

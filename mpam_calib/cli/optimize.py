@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from mpam_calib.cli.app import app
-from mpam_calib.cli.warning import warn_unconverged
+from mpam_calib.cli.arguments import RunToRead
+from mpam_calib.cli.telling import warn_unconverged
 
 
 @app.command()
 def optimize(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder that calibrate wrote.")],
+    run: RunToRead,
     seed: Annotated[int, typer.Option(help="Seed of the searches and the tolerances.", min=0)] = 0,
 ) -> None:
     """Find the muscles with the largest blocked force, under the posterior of a run.

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from mpam_calib.cli.app import app
-from mpam_calib.cli.warning import warn, warn_unconverged
+from mpam_calib.cli.arguments import RunToRead
+from mpam_calib.cli.telling import warn, warn_unconverged
 
 
 @app.command()
 def predict(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder that calibrate wrote.")],
+    run: RunToRead,
     pressure: Annotated[
         str | None,
         typer.Option(

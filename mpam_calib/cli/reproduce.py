@@ -14,19 +14,19 @@ from mpam_calib.cli.app import app
 def reproduce(
     out: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="DIR", help="folder for reproduction.csv and report.html"),
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for reproduction.csv and report.html."),
     ],
-    seed: Annotated[int, typer.Option(help="seed of the stochastic searches", min=0)] = 0,
-    mpam1: Annotated[Path | None, typer.Option(help="RUN folder whose bands are shown for MPAM1")] = None,
-    mpam2: Annotated[Path | None, typer.Option(help="RUN folder whose bands are shown for MPAM2")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the stochastic searches.", min=0)] = 0,
+    mpam1: Annotated[Path | None, typer.Option(help="RUN folder whose bands are shown for MPAM1.")] = None,
+    mpam2: Annotated[Path | None, typer.Option(help="RUN folder whose bands are shown for MPAM2.")] = None,
     mpam1_strand: Annotated[
-        Path | None, typer.Option(help="RUN folder of MPAM1 with strand friction, for f_s and Fig. 4.21")
+        Path | None, typer.Option(help="RUN folder of MPAM1 with strand friction, for f_s and Fig. 4.21.")
     ] = None,
 ) -> None:
     """Recompute every table and number of the thesis and name its misprints."""
     from rich.console import Console
 
-    from mpam_calib.cli.warning import warn_unconverged
+    from mpam_calib.cli.telling import warn_unconverged
     from mpam_calib.run.files import REPRODUCTION, demand_folder
     from mpam_calib.thesis.page import page
     from mpam_calib.thesis.posterior import MPAM1, MPAM1_STRAND, MPAM2, MuscleBands, missing

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from mpam_calib.cli.app import app
+from mpam_calib.cli.arguments import AnySeed, RunToWrite, SpecimenPath
+from mpam_calib.cli.telling import tell_page
 
 
 @app.command()
 def select(
-    specimen: Annotated[
-        Path, typer.Argument(metavar="SPECIMEN", help="specimen folder or its specimen.toml")
-    ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="RUN", help="the RUN folder to write")],
-    seed: Annotated[int, typer.Option(help="seed of every random choice", min=0)] = 0,
-    replicates: Annotated[int, typer.Option(help="replicates of the confusion matrix (0: none)", min=0)] = 8,
+    specimen: SpecimenPath,
+    output: RunToWrite,
+    seed: AnySeed = 0,
+    replicates: Annotated[int, typer.Option(help="Replicates of the confusion matrix (0: none).", min=0)] = 8,
 ) -> None:
     """Rank orders, laws, frictions, kinematics and strain conventions by evidence and held-out levels.
 
@@ -39,4 +38,4 @@ def select(
     likely = probability(float(models["probability"].iloc[0]))
     print(selection_sentence(models))
     print(f"first of {len(models)}: {best} (probability {likely})")
-    print(f"{output / 'report.html'} {'written' if found else 'kept (same data, model and options)'}")
+    tell_page(output, kept=found is None)

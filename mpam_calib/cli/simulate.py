@@ -2,34 +2,32 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from mpam_calib.cli.app import app
+from mpam_calib.cli.arguments import SpecimenPath
+from mpam_calib.cli.telling import warn
 from mpam_calib.errors import InputError
 
 
 @app.command()
 def simulate(
-    specimen: Annotated[
-        Path, typer.Argument(metavar="SPECIMEN", help="specimen folder or its specimen.toml")
-    ],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR", help="the specimen folder to write")
-    ],
+    specimen: SpecimenPath,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Specimen folder to write.")],
     more: Annotated[
-        list[str] | None, typer.Argument(metavar="ID", help="further effects, after --hide")
+        list[str] | None, typer.Argument(metavar="ID", help="Further effects, after --hide.")
     ] = None,
     hide: Annotated[
         list[str] | None,
         typer.Option(
-            help="ID, ID:FORM, ID=VALUE or ID:FORM=VALUE: an effect to hide, its size in its parameter's unit"
+            help="ID, ID:FORM, ID=VALUE or ID:FORM=VALUE: an effect to hide, "
+            "its size in its parameter's unit."
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(help="seed of the noise", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the noise.", min=0)] = 0,
 ) -> None:
     """Write a specimen folder with synthetic recordings of the declared simulation.
 
@@ -50,8 +48,7 @@ def simulate(
     real = read(specimen, data_required=False)
     made = make(real, _sizes([*(hide or []), *(more or [])]), seed)
     write_specimen(made, source, output)
-    for name in made.not_shown:
-        print(f"warning: {name} changes no force that this recording could show", file=sys.stderr)
+    warn(f"{name} changes no force that this recording could show" for name in made.not_shown)
     left = [file.name for file in real.files if file.kind in ("blocked_force", "free_contraction")]
     if left:
         print(f"not simulated: {', '.join(left)}")
