@@ -26,6 +26,16 @@ class Rest(NamedTuple):
     t0: Array
     alpha0: Array
 
+    @property
+    def strand(self) -> Array:
+        """Length of a strand, m: B = L0 / sin α0 (thesis Eq. 2.1)."""
+        return self.L0 / np.sin(self.alpha0)
+
+    @property
+    def winding(self) -> Array:
+        """Angle by which a strand winds round the muscle, rad: 2πN = B cos α0 / R0 (thesis Eq. 2.2)."""
+        return self.strand * np.cos(self.alpha0) / self.R0
+
 
 class Shape(NamedTuple):
     """Geometry under load: outer radius R and wall t (m), T = tan²α, length L (m)."""
@@ -65,8 +75,12 @@ def wall_at_constant_volume(L: Array, R: Array, rest: Rest) -> Array:
     L (2Rt − t²) = L0 (2 R0 t0 − t0²); the root below R. Where the wall's volume would fill the whole
     cylinder the thickness is R.
     """
-    section = rest.L0 * (2.0 * rest.R0 * rest.t0 - rest.t0**2) / L
-    return R - np.sqrt(np.maximum(R**2 - section, 0.0))
+    return R - np.sqrt(np.maximum(R**2 - _section(L, rest), 0.0))
+
+
+def _section(L: Array, rest: Rest) -> Array:
+    """Section of a wall of constant volume over π, m²: 2Rt − t² at length L (m)."""
+    return rest.L0 * (2.0 * rest.R0 * rest.t0 - rest.t0**2) / L
 
 
 def wall_of_a_thin_bladder(L: Array, R: Array, rest: Rest) -> Array:
@@ -86,8 +100,7 @@ def wall_as_at_rest(L: Array, R: Array, rest: Rest) -> Array:
 
 def radius_constant_thickness(L: Array, rest: Rest) -> Array:
     """Outer radius (m) of a bladder of constant volume and constant thickness (thesis Eq. 4.16)."""
-    section = rest.L0 * (2.0 * rest.R0 * rest.t0 - rest.t0**2) / L
-    return (section + rest.t0**2) / (2.0 * rest.t0)
+    return (_section(L, rest) + rest.t0**2) / (2.0 * rest.t0)
 
 
 def shape_inextensible_braid(L: Array, rest: Rest) -> Shape:

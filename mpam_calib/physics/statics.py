@@ -72,16 +72,12 @@ def modulus_columns(shape: Shape, rest: Rest, convention: str, order: int) -> Ar
 def braid_energy_force(P: Array, L: Array, rest: Rest, E_br: float, R_br: float, n: int) -> Array:
     """Force lost to the energy in the stretched strands, N (thesis Eq. 2.25; to be subtracted).
 
-    F_br = L/(E_br A_br n) · 4π²P²B³/(2πN)⁴ with B = L0/sin α0 and 2πN = B cos α0 / R0.
+    F_br = L/(E_br A_br n) · 4π²P²B³/(2πN)⁴ with a strand's length B and winding 2πN.
     """
-    B = rest.L0 / np.sin(rest.alpha0)
-    turns = B * np.cos(rest.alpha0) / rest.R0
     area = np.pi * R_br**2
-    return L / (E_br * area * n) * 4.0 * np.pi**2 * P**2 * B**3 / turns**4
+    return L / (E_br * area * n) * 4.0 * np.pi**2 * P**2 * rest.strand**3 / rest.winding**4
 
 
 def strand_strain(P: Array, L: Array, rest: Rest, E_br: float, R_br: float, n: int) -> Array:
     """Strain of a strand under the tension 2πPBL/(n (2πN)²), whose energy is that of thesis Eq. 2.25."""
-    B = rest.L0 / np.sin(rest.alpha0)
-    turns = B * np.cos(rest.alpha0) / rest.R0
-    return 2.0 * np.pi * P * B * L / (n * turns**2) / (E_br * np.pi * R_br**2)
+    return 2.0 * np.pi * P * rest.strand * L / (n * rest.winding**2) / (E_br * np.pi * R_br**2)

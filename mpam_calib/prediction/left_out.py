@@ -131,20 +131,24 @@ def _likelihood(target: Collapsed, draws: Draws) -> Array:
 
 def _reweighted(fold: Collapsed, draws: Draws, whole: Array, rng: np.random.Generator) -> Array | None:
     """Coordinates (N, d) drawn from the posterior without the level; None where none can be found."""
-    az = import_arviz()
-
     ratio = _likelihood(fold, draws) - whole
-    weight, shape = az.psislw(np.where(np.isfinite(ratio), ratio, -np.inf))
-    if float(shape) <= min(RELIABLE, 1.0 - 1.0 / np.log10(len(draws))):
-        return draws.u[rng.choice(len(draws), len(draws), p=np.exp(weight))]
+    weight, shape = _smoothed(ratio)
+    if shape <= min(RELIABLE, 1.0 - 1.0 / np.log10(len(draws))):
+        return draws.u[rng.choice(len(draws), len(draws), p=weight)]
     start = draws.u[int(np.argmax(ratio))]
     mixture = laplace_mixture(climb_modes(fold, [start, draws.u.mean(axis=0)]))
     proposed = mixture.draw(PROPOSED, np.random.RandomState(int(rng.integers(2**31))))
     ratio = evaluate(fold, proposed) - mixture.log_density(proposed)
     if not np.isfinite(ratio).any():
         return None
-    weight, _ = az.psislw(np.where(np.isfinite(ratio), ratio, -np.inf))
-    return proposed[rng.choice(PROPOSED, len(draws), p=np.exp(weight))]
+    weight, _ = _smoothed(ratio)
+    return proposed[rng.choice(PROPOSED, len(draws), p=weight)]
+
+
+def _smoothed(ratio: Array) -> tuple[Array, float]:
+    """Smoothed weights (N,), which add up to one, of draws with these log ratios, and Pareto's k."""
+    weight, shape = import_arviz().psislw(np.where(np.isfinite(ratio), ratio, -np.inf))
+    return np.exp(weight), float(shape)
 
 
 def _predict(

@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 from mpam_calib.physics.friction import strand_friction_per_f_s
 from mpam_calib.physics.kinematics import Rest, Shape, shape_constant_thickness
 from mpam_calib.physics.statics import gas_force, modulus_columns, thickness_force
+from mpam_calib.prediction import protocol
 from mpam_calib.thesis.tables import number, table
 from mpam_calib.units import DEG, GPA, KPA, MM
 
@@ -23,7 +24,7 @@ L0, R0, T0, ALPHA0 = 50 * MM, 3 * MM, 0.7 * MM, 72 * DEG
 """The muscles as built (thesis 4.2.2, 4.6.2.1): m, m, m, rad."""
 F_S, E_BR, NU_S = 0.15, 2.0 * GPA, 0.33
 """Strand friction of chapter 4: f_s, Young's modulus (Pa) and Poisson's ratio of a strand."""
-LEVELS = np.array([50.0, 100.0, 150.0, 200.0, 250.0]) * KPA
+LEVELS = protocol.LEVELS
 """The five pressures of the loops, Pa."""
 MUSCLES = {"MPAM1": "4.3", "MPAM2": "4.7"}
 """Which table holds a muscle's moduli."""

@@ -95,7 +95,7 @@ def log_evidence_beyond_laplace(
     slow = many_parameters(fits) or blueprint.simulation.law == OWN_RATES
     worth = worth if slow else -np.inf
     terms, inner = _sizes(problem, blueprint, fits, worth=worth, rates=rates)
-    value = float(np.logaddexp.reduce(list(terms.values())))
+    value = _summed(terms)
     return value, _error(terms, {size: found.error for size, (_, found) in inner.items()})
 
 
@@ -105,14 +105,14 @@ def weigh(problem: Problem, blueprint: Blueprint, fits: list[Fit], seed: int) ->
     For models of at most SETTLES parameters.
     """
     terms, inner = _sizes(problem, blueprint, fits)
-    quadrature = float(np.logaddexp.reduce(list(terms.values())))
+    quadrature = _summed(terms)
     own = _error(terms, {size: found.error for size, (_, found) in inner.items()})
     if not inner:
         return Weighed(quadrature, own, Bridge(quadrature, float("inf")))
     bridges = {size: bridge_evidence(density, found, seed) for size, (density, found) in inner.items()}
     error = _error(terms, {size: bridge.error for size, bridge in bridges.items()})
     terms |= {size: bridge.value + log(SIZE_PRIOR[size]) for size, bridge in bridges.items()}
-    return Weighed(quadrature, own, Bridge(float(np.logaddexp.reduce(list(terms.values()))), error))
+    return Weighed(quadrature, own, Bridge(_summed(terms), error))
 
 
 def under_other_priors(problem: Problem, blueprint: Blueprint, fits: list[Fit], known: float) -> list[float]:
@@ -123,7 +123,7 @@ def under_other_priors(problem: Problem, blueprint: Blueprint, fits: list[Fit], 
 
     def total(widths: tuple[float, float], worth: float = -np.inf) -> float:
         terms, _ = _sizes(problem, blueprint, fits, widths, worth)
-        return float(np.logaddexp.reduce(list(terms.values())))
+        return _summed(terms)
 
     if many_parameters(fits):
         laplace = np.array([total(widths, worth=np.inf) for widths in WIDTHS.values()])
@@ -136,9 +136,14 @@ def many_parameters(fits: list[Fit]) -> bool:
     return len(fits[0].u) > SETTLES
 
 
+def _summed(terms: dict[int, float]) -> float:
+    """Log of the sum over the remainder's sizes, of log terms by size."""
+    return float(np.logaddexp.reduce(list(terms.values())))
+
+
 def _error(terms: dict[int, float], errors: dict[int, float]) -> float:
     """Error of the sum of terms, of which some have errors (none: not known)."""
-    total = np.logaddexp.reduce(list(terms.values()))
+    total = _summed(terms)
     parts = [float(np.exp(terms[size] - total)) * error for size, error in errors.items()]
     return float(np.linalg.norm(parts)) if parts else float("nan")
 
@@ -156,7 +161,7 @@ def _sizes(
     ``widths`` as in WIDTHS; where Laplace's figures are not ``worth`` more (nats), they will do.
     """
     terms = {f.size: f.log_share for f in fits}
-    best, laplace = max(terms.values()), np.logaddexp.reduce(list(terms.values()))
+    best, laplace = max(terms.values()), _summed(terms)
     declared, many = widths == AS_DECLARED, many_parameters(fits)
     # Under other priors the fits' own evidences say only roughly which sizes matter.
     within = NEGLIGIBLE if declared else NEGLIGIBLE_ELSEWHERE
@@ -170,7 +175,7 @@ def _sizes(
         terms[found.size] = mode.log_evidence + log(SIZE_PRIOR[found.size])
     terms = {size: value for size, value in terms.items() if declared or size in modes}
     inner: dict[int, tuple[Hypothesis, Evidence]] = {}
-    if max(laplace, np.logaddexp.reduce(list(terms.values()))) < worth:
+    if max(laplace, _summed(terms)) < worth:
         return terms, inner
     best = -np.inf
     # The largest first: of many parameters Laplace may say several nats too much.

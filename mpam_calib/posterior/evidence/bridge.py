@@ -16,7 +16,7 @@ from scipy import special
 
 from mpam_calib.posterior.chains.proposal import StudentMixture
 from mpam_calib.posterior.density.mode import Density, evaluate
-from mpam_calib.posterior.evidence.quadrature import RELIABLE, Evidence
+from mpam_calib.posterior.evidence.quadrature import Evidence, settled
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Bridge(NamedTuple):
     @property
     def reliable(self) -> bool:
         """Whether the two sets of draws overlap enough for the error to mean anything."""
-        return bool(np.isfinite(self.value) and self.error <= RELIABLE)
+        return settled(self.value, self.error)
 
 
 def bridge_evidence(density: Density, found: Evidence, seed: int) -> Bridge:

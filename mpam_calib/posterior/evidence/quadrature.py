@@ -47,6 +47,11 @@ RELIABLE = 0.1
 """Error (nats) above which the randomisations have not settled, and the error is too small itself."""
 
 
+def settled(value: float, error: float) -> bool:
+    """Whether a log evidence and its error (nats) are figures to be used."""
+    return bool(np.isfinite(value) and error <= RELIABLE)
+
+
 class Evidence(NamedTuple):
     """ln ∫ p(y|θ) p(θ) dθ (nats), its error, and the posterior's mean (d,) and covariance (d, d)."""
 
@@ -58,7 +63,7 @@ class Evidence(NamedTuple):
     @property
     def reliable(self) -> bool:
         """Whether the randomisations agree well enough for the figure to be used."""
-        return bool(np.isfinite(self.value) and self.error <= RELIABLE)
+        return settled(self.value, self.error)
 
     @classmethod
     def of_points(cls, value: float, error: float, u: Array, weight: Array) -> Evidence:
