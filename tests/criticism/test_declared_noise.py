@@ -16,7 +16,6 @@ from mpam_calib.criticism.data.problem import Problem, build_problem
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.noise import CORRELATED, TIME, WHITE
-from mpam_calib.posterior.likelihood.covariance import fast_noise_log_likelihood
 from mpam_calib.specimen import read
 from mpam_calib.specimen.declaration import Noise
 from mpam_calib.specimen.recording import ForceMap, Specimen
@@ -107,7 +106,7 @@ def test_the_search_reaches_the_noise(name: str) -> None:
     def log_posterior(*sizes: float) -> float:
         values = [np.array([v]) for v in sizes]
         u = [priors[n].to_normal(v)[0] for n, v in zip((WHITE, CORRELATED, TIME), values, strict=True)]
-        return float(fast_noise_log_likelihood(scatter, 1, *values)[0]) - 0.5 * float(np.square(u).sum())
+        return float(scatter.log_likelihood(1, *values)[0]) - 0.5 * float(np.square(u).sum())
 
     assert log_posterior(found.white, found.correlated, found.time) >= log_posterior(*MADE)
     assert found.total == pytest.approx(np.hypot(*MADE[:2]), rel=0.1)

@@ -7,7 +7,7 @@ import pytest
 
 from mpam_calib.posterior.density.piece import segment_piece
 from mpam_calib.posterior.likelihood.algebra import cholesky, inverse, solve
-from mpam_calib.posterior.likelihood.covariance import scatter_log_likelihood
+from mpam_calib.posterior.likelihood.scatter import FastScatter
 from mpam_calib.posterior.likelihood.sites import chunk_log_likelihood
 
 M = 3
@@ -52,7 +52,7 @@ def test_noise_within_bins() -> None:
     made, rng = matrices(3, 4), np.random.default_rng(4)
     chunks = rng.standard_normal((20, M))
     for value in (
-        scatter_log_likelihood(chunks.T @ chunks, len(chunks), made),
+        FastScatter(chunks.T @ chunks, len(chunks), np.eye(M), 1.0).log_likelihood_of(made),
         chunk_log_likelihood(made, chunks, np.ones((1, len(chunks)))),
     ):
         assert not np.isfinite(value[1])

@@ -11,9 +11,9 @@ from model import build
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.posterior.density.target import build_target
 from mpam_calib.posterior.likelihood.bins import bin_loops
-from mpam_calib.posterior.likelihood.covariance import StrokeCovariance, fast_noise_log_likelihood
+from mpam_calib.posterior.likelihood.covariance import StrokeCovariance
 from mpam_calib.posterior.likelihood.markov import factor, whiten
-from mpam_calib.posterior.likelihood.scatter import Scatter
+from mpam_calib.posterior.likelihood.scatter import MarkovScatter
 
 from .reference import Twin
 
@@ -49,10 +49,8 @@ def test_the_scatter_inside_bins_says_what_its_dense_covariance_says():
     bins = bin_loops(loops)
     assert bins.scatter is not None
     white, correlated, time, _ = NOISE["both"]
-    found = Scatter.build(bins.scatter, 3).log_likelihood(white, correlated, time)
-    assert found == pytest.approx(
-        fast_noise_log_likelihood(bins.scatter, 3, white, correlated, time), rel=1e-10
-    )
+    found = MarkovScatter.build(bins.scatter, 3).log_likelihood(white, correlated, time)
+    assert found == pytest.approx(bins.scatter.log_likelihood(3, white, correlated, time), rel=1e-10)
 
 
 def test_a_stroke_that_turns_back_is_left_to_the_dense_covariance():

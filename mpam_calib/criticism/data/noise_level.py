@@ -26,7 +26,7 @@ from mpam_calib.criticism.data.noise_windows import (
 from mpam_calib.model.model import Model
 from mpam_calib.model.noise import CORRELATED, GROWTH, SHORTEST, TIME, WHITE, grown
 from mpam_calib.model.priors import LogUniform, Prior
-from mpam_calib.posterior.likelihood.covariance import fast_noise_covariance, scatter_log_likelihood
+from mpam_calib.posterior.likelihood.scatter import FastScatter
 from mpam_calib.posterior.likelihood.sites import chunk_log_likelihood
 from mpam_calib.specimen.recording import Loops
 
@@ -177,7 +177,7 @@ class _Paced(NamedTuple):
     """Windows of one pace, and what no noise changes: their scatter, and their time steps (s)."""
 
     windows: Windows
-    scatter: tuple[Array, int, Array, float]
+    scatter: FastScatter
     steps: list[float]
 
 
@@ -193,10 +193,10 @@ def _log_likelihood(parts: list[_Paced], noise: NoiseLevel, averaged: int, scale
     sizes = [np.array([size]) for size in (noise.white, noise.correlated, noise.time)]
     total = 0.0
     for some, scatter, steps in parts:
-        seen = [(*scatter[:3], dt) for dt in ([noise.reading] if noise.reading else steps)]
-        covariance = np.mean([fast_noise_covariance(s, averaged, *sizes) for s in seen], axis=0)
+        seen = [replace(scatter, dt=dt) for dt in ([noise.reading] if noise.reading else steps)]
+        covariance = np.mean([one.covariance(averaged, *sizes) for one in seen], axis=0)
         if noise.growth == 0.0:
-            total += float(scatter_log_likelihood(*scatter[:2], covariance)[0])
+            total += float(scatter.log_likelihood_of(covariance)[0])
         else:
             grows = grown(np.array([[noise.growth]]), some.force, scale)
             total += float(chunk_log_likelihood(covariance, some.chunks, grows)[0])

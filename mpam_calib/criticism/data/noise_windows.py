@@ -14,6 +14,7 @@ from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 from scipy import stats
 
+from mpam_calib.posterior.likelihood.scatter import FastScatter
 from mpam_calib.posterior.likelihood.sites import usual_chunks
 from mpam_calib.specimen.recording import Loops
 
@@ -74,9 +75,9 @@ class Windows(NamedTuple):
         """Those picked by a mask or by numbers."""
         return self._replace(chunks=self.chunks[which], force=self.force[which], dt=self.dt[which])
 
-    def scatter(self, dt: float) -> tuple[Array, int, Array, float]:
+    def scatter(self, dt: float) -> FastScatter:
         """As the likelihood of fast noise takes it, the readings ``dt`` (s) apart."""
-        return self.chunks.T @ self.chunks, len(self.chunks), self.contrast, dt
+        return FastScatter(self.chunks.T @ self.chunks, len(self.chunks), self.contrast, dt)
 
 
 def inside_strokes(loops: Loops, degree: int = DEGREE) -> Windows | None:

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mpam_calib.posterior.likelihood.algebra import cholesky, inverse, log_determinant
 from mpam_calib.posterior.likelihood.bins import LoopBins
 from mpam_calib.posterior.likelihood.markov import Parts
 
@@ -211,34 +210,3 @@ def lasting_share(rows: Array, dt: Array, time: Array) -> Array:
     """
     _, own = _of_means(rows, -dt / time[:, None])
     return np.sqrt(own)
-
-
-def fast_noise_covariance(
-    scatter: tuple[Array, int, Array, float], averaged: int, white: Array, correlated: Array, time: Array
-) -> Array:
-    """Covariance (B, dof, dof), N², of a chunk's detrended residuals under white + AR(1) noise."""
-    _, _, contrast, dt = scatter
-    size = contrast.shape[0]
-    lags = np.abs(np.subtract.outer(np.arange(size), np.arange(size)))
-    covariance = correlated[:, None, None] ** 2 * np.exp(-lags * dt / time[:, None, None])
-    covariance = covariance + white[:, None, None] ** 2 / averaged * np.eye(size)
-    return np.asarray(contrast.T @ covariance @ contrast)
-
-
-def fast_noise_log_likelihood(
-    scatter: tuple[Array, int, Array, float], averaged: int, white: Array, correlated: Array, time: Array
-) -> Array:
-    """Log-likelihood (B,) of the scatter inside bins under white + AR(1) noise."""
-    total, chunks, _, _ = scatter
-    return scatter_log_likelihood(
-        total, chunks, fast_noise_covariance(scatter, averaged, white, correlated, time)
-    )
-
-
-def scatter_log_likelihood(total: Array, chunks: int, covariance: Array) -> Array:
-    """Log-likelihood (B,) of so many chunks with the sum of squares ``total`` (dof, dof), given a covariance
-    (B, dof, dof) of each."""
-    log_det = log_determinant(cholesky(covariance))
-    trace = np.sum(inverse(covariance) * total.T, axis=(1, 2))
-    result: Array = -0.5 * (chunks * (log_det + len(total) * np.log(2.0 * np.pi)) + trace)
-    return result
