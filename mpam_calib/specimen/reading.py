@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,15 @@ from mpam_calib.specimen.consistency import (
 from mpam_calib.specimen.declaration import Declaration, FileKind
 from mpam_calib.specimen.levels import medians_by_label, merge_levels, static_levels
 from mpam_calib.specimen.loops import LoopsRead, read_loops
-from mpam_calib.specimen.recording import BlockedForce, Bools, FileRead, Floats, FreeContraction, Specimen
+from mpam_calib.specimen.recording import (
+    BlockedForce,
+    Bools,
+    FileRead,
+    Floats,
+    FreeContraction,
+    Specimen,
+    Tensile,
+)
 from mpam_calib.specimen.source import DataFile, data_files, digest, refuse_skipped_headers
 from mpam_calib.specimen.static_files import (
     ForceMapRead,
@@ -35,6 +43,33 @@ from mpam_calib.specimen.validation import validate
 from mpam_calib.units import KPA
 
 
+@dataclass(frozen=True)
+class _Recordings:
+    """What a specimen's files hold, and the number of ``rows`` of each file of a kind."""
+
+    loops: LoopsRead | None
+    force_map: ForceMapRead | None
+    blocked_force: BlockedForce | None
+    free_contraction: FreeContraction | None
+    tensile: Tensile | None
+    rows: dict[FileKind, tuple[int, ...]]
+
+    @property
+    def muscle_rows(self) -> int:
+        """Rows of all files but those of the bladder's material."""
+        return sum(sum(counts) for kind, counts in self.rows.items() if kind != "tensile")
+
+    @property
+    def censored(self) -> list[Bools]:
+        """Which rows are slack, for each recording of a force."""
+        forces = (
+            None if self.loops is None else self.loops.loops,
+            None if self.force_map is None else self.force_map.force_map,
+            self.blocked_force,
+        )
+        return [part.censored for part in forces if part is not None]
+
+
 def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
     """See :func:`mpam_calib.specimen.read`."""
     source = read_toml(path)
@@ -43,47 +78,22 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
     check_parts(source, declaration, data_required=data_required)
     files = data_files(source, declaration)
     refuse_skipped_headers(source, files)
-    floor = declaration.sensors.force_floor_N
-    geometry = declaration.geometry
-    rows: dict[FileKind, tuple[int, ...]] = {}
-
-    def of(kind: FileKind) -> list[DataFile]:
-        return [file for file in files if file.kind == kind]
-
-    loops = force_map = blocked = free = tensile = None
-    if geometry is not None:
-        if of("loops"):
-            loops = read_loops(of("loops"), geometry, floor)
-            rows["loops"] = loops.rows
-        if of("force_map"):
-            force_map = read_force_map(of("force_map"), geometry, floor)
-            rows["force_map"] = force_map.rows
-        if of("blocked_force"):
-            blocked, rows["blocked_force"] = read_blocked_force(of("blocked_force"), geometry, floor)
-        if of("free_contraction"):
-            free, rows["free_contraction"] = read_free_contraction(of("free_contraction"), geometry)
-    if of("tensile"):
-        tensile, rows["tensile"] = read_tensile(of("tensile"))
-        check_strains(source, declaration, of("tensile")[0].label, tensile, simulation.order + 1)
-
-    levels_Pa, loops, force_map = _common_levels(loops, force_map, blocked, free)
-    muscle_rows = sum(sum(counts) for kind, counts in rows.items() if kind != "tensile")
-    if muscle_rows:
-        first = next(file for file in files if file.kind != "tensile")
-        check_rows(first.label, muscle_rows, least_parameters(simulation, len(levels_Pa)))
-        muscle = (
-            None if loops is None else loops.loops,
-            None if force_map is None else force_map.force_map,
-            blocked,
-        )
-        flags = [part.censored for part in muscle if part is not None]
-        _check_pulls(first.label, levels_Pa, flags)
+    found = _read_files(files, declaration)
+    if found.tensile is not None:
+        label = _of_kind(files, "tensile")[0].label
+        check_strains(source, declaration, label, found.tensile, simulation.order + 1)
+    levels_Pa, found = _on_common_levels(found)
+    loops, force_map = found.loops, found.force_map
+    if found.muscle_rows:
+        label = next(file.label for file in files if file.kind != "tensile")
+        check_rows(label, found.muscle_rows, least_parameters(simulation, len(levels_Pa)))
+        _check_pulls(label, levels_Pa, found.censored)
         check_levels(source, simulation, levels_Pa, by_setpoint=loops is not None and loops.by_setpoint)
     return Specimen(
         name=declaration.specimen.name,
         bladder_material=declaration.specimen.bladder_material,
         folder=source.file.parent,
-        geometry=geometry,
+        geometry=declaration.geometry,
         braid=declaration.braid,
         sensors=declaration.sensors,
         simulation=simulation,
@@ -92,9 +102,9 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
         levels_Pa=levels_Pa,
         loops=loops.loops if loops else None,
         force_map=force_map.force_map if force_map else None,
-        blocked_force=blocked,
-        free_contraction=free,
-        tensile=tensile,
+        blocked_force=found.blocked_force,
+        free_contraction=found.free_contraction,
+        tensile=found.tensile,
         digest=_digest(source, declaration, files),
         notes=(
             *(loops.notes if loops else ()),
@@ -103,12 +113,37 @@ def read_specimen(path: Path, *, data_required: bool = True) -> Specimen:
         ),
         files=tuple(
             FileRead(file.kind, file.name, count, file.form.delimiter, file.form.decimal)
-            for kind, counts in rows.items()
-            for file, count in zip(of(kind), counts, strict=True)
+            for kind, counts in found.rows.items()
+            for file, count in zip(_of_kind(files, kind), counts, strict=True)
         ),
         noise=declaration.noise,
         declared_in=source.file,
     )
+
+
+def _of_kind(files: list[DataFile], kind: FileKind) -> list[DataFile]:
+    return [file for file in files if file.kind == kind]
+
+
+def _read_files(files: list[DataFile], declaration: Declaration) -> _Recordings:
+    """Everything that is declared; a muscle's data only beside its geometry."""
+    geometry, floor = declaration.geometry, declaration.sensors.force_floor_N
+    rows: dict[FileKind, tuple[int, ...]] = {}
+    loops = force_map = blocked = free = tensile = None
+    if geometry is not None:
+        if those := _of_kind(files, "loops"):
+            loops = read_loops(those, geometry, floor)
+            rows["loops"] = loops.rows
+        if those := _of_kind(files, "force_map"):
+            force_map = read_force_map(those, geometry, floor)
+            rows["force_map"] = force_map.rows
+        if those := _of_kind(files, "blocked_force"):
+            blocked, rows["blocked_force"] = read_blocked_force(those, geometry, floor)
+        if those := _of_kind(files, "free_contraction"):
+            free, rows["free_contraction"] = read_free_contraction(those, geometry)
+    if those := _of_kind(files, "tensile"):
+        tensile, rows["tensile"] = read_tensile(those)
+    return _Recordings(loops, force_map, blocked, free, tensile, rows)
 
 
 def _overlooked(files: list[DataFile]) -> list[str]:
@@ -120,19 +155,16 @@ def _overlooked(files: list[DataFile]) -> list[str]:
     ]
 
 
-def _common_levels(
-    loops: LoopsRead | None,
-    force_map: ForceMapRead | None,
-    blocked: BlockedForce | None,
-    free: FreeContraction | None,
-) -> tuple[Floats, LoopsRead | None, ForceMapRead | None]:
+def _on_common_levels(found: _Recordings) -> tuple[Floats, _Recordings]:
     """One list of levels (Pa, sorted), and the recordings with ``level`` indexing it."""
+    loops, force_map = found.loops, found.force_map
     if loops is None and force_map is None:
-        pressures = [part.pressure_Pa for part in (blocked, free) if part is not None]
+        static = (found.blocked_force, found.free_contraction)
+        pressures = [part.pressure_Pa for part in static if part is not None]
         if not pressures:
-            return np.zeros(0), None, None
+            return np.zeros(0), found
         together = np.concatenate(pressures)
-        return medians_by_label(together, static_levels(together)), None, None
+        return medians_by_label(together, static_levels(together)), found
     nothing = np.zeros(0)
     levels, loop_index, map_index = merge_levels(
         nothing if loops is None else loops.levels_Pa, nothing if force_map is None else force_map.levels_Pa
@@ -142,7 +174,7 @@ def _common_levels(
     if force_map is not None:
         moved = replace(force_map.force_map, level=map_index[force_map.force_map.level])
         force_map = replace(force_map, force_map=moved)
-    return levels, loops, force_map
+    return levels, replace(found, loops=loops, force_map=force_map)
 
 
 def _check_pulls(label: str, levels_Pa: Floats, censored: list[Bools]) -> None:
