@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mpam_calib.criticism.data.problem import build_problem
+from mpam_calib.criticism.data.build import build_problem
 from mpam_calib.criticism.diagnose import describe, diagnose
 from mpam_calib.criticism.selection.held_out import hold_out_each
 from mpam_calib.criticism.selection.ranking import fitted

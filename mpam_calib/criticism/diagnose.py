@@ -8,7 +8,8 @@ from functools import partial
 from typing import Any
 
 from mpam_calib.criticism.budget import Budget, misfit_budget
-from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
+from mpam_calib.criticism.data.build import build_problem
+from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import extended
 from mpam_calib.criticism.fitting.noise_scale import settle_guess
 from mpam_calib.criticism.gain import Gain, measure_gain

@@ -22,7 +22,8 @@ from rig import recipes, sets
 from rig.oracle import Oracle
 
 from criticism.found import search
-from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
+from mpam_calib.criticism.data.build import build_problem
+from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.folds import folds_of
 from mpam_calib.criticism.gain import measure_gain
 from mpam_calib.criticism.searching.candidates import HISTORY, candidates

@@ -24,7 +24,7 @@ from rig import margins, recipes, sets
 from rig.effects import form as rig_form
 
 from criticism.found import search
-from mpam_calib.criticism.data.problem import build_problem
+from mpam_calib.criticism.data.build import build_problem
 from mpam_calib.criticism.searching.candidates import candidates
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.searching.usual_braid import with_strands

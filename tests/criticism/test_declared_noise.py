@@ -10,9 +10,10 @@ import pytest
 from prediction.coverage import as_specimen, rig_case
 from rig.chain import force_of
 
+from mpam_calib.criticism.data.build import build_problem
 from mpam_calib.criticism.data.noise_level import noise_level
 from mpam_calib.criticism.data.noise_windows import inside_strokes
-from mpam_calib.criticism.data.problem import Problem, build_problem
+from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.noise import CORRELATED, TIME, WHITE

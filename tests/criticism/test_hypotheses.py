@@ -12,7 +12,8 @@ from rig import case as rig_case
 from rig import recipes, sets
 from scipy import stats
 
-from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
+from mpam_calib.criticism.data.build import build_problem
+from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import chain_for, fit
 from mpam_calib.criticism.fitting.predicted import linearise
 from mpam_calib.criticism.searching.candidates import candidates

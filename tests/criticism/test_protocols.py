@@ -19,7 +19,8 @@ from rig import recipes
 from rig.effects import shared_form
 from rig.recipes import Recipe, Wanted
 
-from mpam_calib.criticism.data.problem import Problem, build_problem
+from mpam_calib.criticism.data.build import build_problem
+from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.fitting.forms import forms_of
 from mpam_calib.model.blueprint import Options, draw_blueprint

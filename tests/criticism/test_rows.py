@@ -13,7 +13,7 @@ from rig import case as rig_case
 from rig import recipes
 
 from criticism.test_hypotheses import null_recipe, problem_of
-from mpam_calib.criticism.data import problem as module
+from mpam_calib.criticism.data import build as module
 from mpam_calib.criticism.data import rows
 from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.likelihood.points import Points

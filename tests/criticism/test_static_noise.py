@@ -12,7 +12,8 @@ from rig.muscle import static_force
 from rig.specimens import FAMILIES, loops_muscle
 
 from criticism.found import search
-from mpam_calib.criticism.data.problem import Problem, build_problem
+from mpam_calib.criticism.data.build import build_problem
+from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.data.static_noise import static_noise
 from mpam_calib.criticism.diagnose import diagnose
 from mpam_calib.criticism.searching.candidates import candidates

@@ -11,7 +11,8 @@ from rig.muscle import polynomial_stress
 
 from criticism.found import search
 from criticism.test_hypotheses import null_recipe
-from mpam_calib.criticism.data.problem import SIZES, Problem, build_problem
+from mpam_calib.criticism.data.build import build_problem
+from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.searching.candidates import candidates
 from mpam_calib.criticism.verdict import judge

@@ -16,7 +16,8 @@ from rig.effects import shared_form
 from rig.unusual import Unusual
 
 from criticism.found import search
-from mpam_calib.criticism.data.problem import Problem, build_problem
+from mpam_calib.criticism.data.build import build_problem
+from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import chain_for, fit
 from mpam_calib.criticism.fitting.forms import forms_of
 from mpam_calib.criticism.searching.candidates import candidates

@@ -16,36 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from mpam_calib.criticism.data.noise_level import NoiseLevel, noise_level
-from mpam_calib.criticism.data.rows import Rows, telling_points, telling_strokes
-from mpam_calib.criticism.data.saturation import along_a_ceiling
-from mpam_calib.criticism.data.static_noise import static_noise
+from mpam_calib.criticism.data.noise_level import NoiseLevel
+from mpam_calib.criticism.data.rows import Rows
 from mpam_calib.criticism.data.whitening import Axes, Whitening
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
-from mpam_calib.model.noise import grown
 from mpam_calib.model.readings import Readings
 from mpam_calib.model.state import Setting
 from mpam_calib.model.tensile import half_waves
-from mpam_calib.posterior.likelihood.bins import LoopBins, bin_loops
-from mpam_calib.posterior.likelihood.covariance import StrokeCovariance
-from mpam_calib.posterior.likelihood.points import gather_points
-from mpam_calib.posterior.tested_moduli import moduli_of_test
-from mpam_calib.specimen.extremes import saturated
-from mpam_calib.specimen.recording import Specimen
-from mpam_calib.specimen.summary import force_noise
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-ROWS = 480
-"""About so many reduced rows; the covariance is dense."""
 HALF_WAVES = 24
 SIZES = (0.0, 0.002, 0.008, 0.03)
 """Sizes of the remainder as shares of the force scale."""
 SIZE_PRIOR = (0.7, 0.1, 0.1, 0.1)
-NOISE_UNKNOWN = 1e-3
-"""Noise of a reading (N) where there are too few to tell it and no sensor sd is declared."""
 STROKE_SHARE = 0.35
 """Size of each stroke's own part of the remainder, as a share of the common part."""
 PRESSURE_LENGTH = 0.08
@@ -53,11 +39,6 @@ PRESSURE_LENGTH = 0.08
 LONG, FAST_SHARE, CURVED = 0.04, 0.3, 0.1
 """A row longer than this share of the stroke, or of its way since the turn, or along which the force is
 curved by more than this share of the row's noise, is looked at in two places."""
-ALIKE, APART = 0.9, 0.5
-"""How alike the rests of two strokes are, and the share of what is left that every bin of a rest has by
-itself: friction fades on the way into a rest, and in it."""
-FORCE_MAP_NOISE = 0.003
-"""Noise of a static reading as a share of the force scale, where no sd is declared and too few tell it."""
 
 SANE = 3.0
 """Prior sds beyond which known moduli are not believed to bend as they say."""
@@ -216,7 +197,7 @@ class Problem:
 
     def with_free_strokes(self) -> Problem:
         """The same with a remainder in which each stroke has as much of its own as it shares."""
-        made = replace(self, kernel=_kernel(self, 1.0))
+        made = replace(self, kernel=kernel(self, 1.0))
         made.__dict__.update({name: getattr(self, name) for name in ("model", "lean", "bow", "root")})
         return made
 
@@ -259,120 +240,7 @@ class Problem:
         return [self.axes.log_det + 2.0 * float(np.sum(np.log(spread))) for spread in self.spreads]
 
 
-def build_problem(specimen: Specimen, blueprint: Blueprint) -> Problem:
-    """Reduce a specimen's muscle data; ``blueprint`` is the declared simulation's without nuisances.
-
-    The moduli of a tensile test have their prior from it.
-    """
-    if blueprint.material is None and (tested := moduli_of_test(specimen)) is not None:
-        blueprint = blueprint.model_copy(update={"material": tested})
-    model = build_model(blueprint)
-    assert model.setting is not None
-    scale = model.setting.force_scale
-    parts: list[tuple[Readings, Readings, Array, Ints]] = []
-    noise: NoiseLevel | None = None
-    blocks: list[Array] = []
-    ties: list[Array] = []
-    loops, beyond, guessed = specimen.loops, 0.0, False
-    if loops is not None:
-        every = len(loops.force_N)
-        loops = loops.without(saturated(loops))
-        noise = noise_level(loops, model)
-        if noise is not None:
-            loops = loops.without(along_a_ceiling(loops, noise.total))
-        beyond = 1.0 - len(loops.force_N) / every
-        looked_at = telling_strokes(loops.clear)
-        bins = bin_loops(loops, int(np.clip(ROWS // len(looked_at), 8, 32)), finest=1)
-        n = len(bins)
-        keep = np.flatnonzero(~bins.slack & np.isin(bins.segment, looked_at))
-        if noise is None:
-            guess = model.setting.force_sd or float(np.nan_to_num(force_noise(loops.clear)))
-            noise = NoiseLevel(guess or NOISE_UNKNOWN, 0.0, 1.0)
-        larger = grown(np.array(noise.growth), bins.force[keep], scale)
-        low, high = bins.readings.take(keep), bins.readings.take(keep + n)
-        parts.append((low, high, bins.force[keep], bins.segment[keep]))
-        own, shared = _held(bins, keep)
-        blocks.append(larger[:, None] * larger * _noise_of_strokes(bins, keep, noise) + own)
-        ties.append(shared)
-    points = gather_points(specimen)
-    if points is not None:
-        keep, _ = telling_points(points)
-        if noise is None:
-            told = model.setting.force_sd or static_noise(points, points.level(model.setting.levels), scale)
-            guessed = not told
-            noise = NoiseLevel(told or FORCE_MAP_NOISE * scale, 0.0, 1.0)
-        rows_of = points.readings.take(keep)
-        parts.append((rows_of, rows_of, points.force[keep], np.full(len(keep), -1)))
-        blocks.append(np.diag((noise.total * grown(np.array(noise.growth), points.force[keep], scale)) ** 2))
-        ties.append(np.zeros((len(keep), 2)))
-    assert noise is not None
-    low = Readings.join([part[0] for part in parts])
-    high = Readings.join([part[1] for part in parts])
-    stroke = np.concatenate([part[3] for part in parts])
-    levels = model.setting.levels
-    level = np.abs(low.pressure[:, None] - levels).argmin(axis=1)
-    level = np.where(low.level >= 0, low.level, level)
-    tied = np.concatenate(ties)
-    problem = Problem(
-        blueprint=blueprint,
-        readings=Readings.join([low, high]),
-        force=np.concatenate([part[2] for part in parts]),
-        level=level,
-        cycle=np.where(stroke >= 0, low.cycle, 0).astype(np.int64),
-        stroke=stroke,
-        noise=linalg.block_diag(*blocks) + tied @ tied.T,
-        tied=tied,
-        kernel=np.zeros((0, 0)),
-        noise_level=noise,
-        has_clock=loops is not None,
-        saturated=beyond,
-        rows=None if loops is None else Rows.of(loops),
-        noise_guessed=guessed,
-    )
-    return replace(problem, kernel=_kernel(problem))
-
-
-def _noise_of_strokes(bins: LoopBins, keep: Ints, noise: NoiseLevel) -> Array:
-    """Covariance (n, n), N², of the noise of these bins at small forces: none between two strokes."""
-    layout = StrokeCovariance.build(bins)
-    if noise.reading:
-        layout = replace(layout, dt=np.full_like(layout.dt, noise.reading))
-    white, correlated, time = (np.array([v]) for v in (noise.white, noise.correlated, noise.time))
-    padded = layout.matrix(white, correlated, time, np.zeros(1))[0][layout.kind]
-    full = np.zeros((len(keep), len(keep)))
-    for segment in np.unique(bins.segment[keep]):
-        rows = np.flatnonzero(bins.segment[keep] == segment)
-        at = bins.position[keep[rows]]
-        full[np.ix_(rows, rows)] = padded[segment][np.ix_(at, at)]
-    return full
-
-
-def _held(bins: LoopBins, keep: Ints) -> tuple[Array, Array]:
-    """What these bins may be off by at rest: their level's friction, alike in all strokes.
-
-    Returns each stroke's own covariance (n, n), N², and a factor (n, 2), N, of what the strokes share.
-    Where the crosshead stops for a while, friction holds, fades or creeps; no model of sliding knows which.
-    """
-    n = len(bins)
-    x, force, sign = bins.middle().displacement, bins.force, bins.readings.sign[:n]
-    doubt = np.zeros(n)
-    for level in np.unique(bins.readings.level[:n]):
-        here = bins.readings.level[:n] == level
-        up, down = (np.flatnonzero(here & (bins.rest < 0.5) & (sign == s)) for s in (1.0, -1.0))
-        if len(up) < 3 or len(down) < 3:
-            continue
-        down = down[np.argsort(x[down])]
-        half = 0.5 * (force[up] - np.interp(x[up], x[down], force[down]))
-        friction = np.polynomial.Polynomial.fit(x[up], half, 1)(x)
-        doubt[here] = (sign * friction * bins.rest)[here]
-    doubt, sign, segment = doubt[keep], sign[keep], bins.segment[keep]
-    shared = np.sqrt(ALIKE) * doubt[:, None] * (sign[:, None] == np.array([1.0, -1.0]))
-    together = (1.0 - APART) * ((segment[:, None] == segment) & (sign[:, None] == sign))
-    own = (1.0 - ALIKE) * doubt[:, None] * doubt * (together + APART * np.eye(len(doubt)))
-    return own, shared
-
-
-def _kernel(problem: Problem, own_share: float = STROKE_SHARE) -> Array:
+def kernel(problem: Problem, own_share: float = STROKE_SHARE) -> Array:
     """The remainder's covariance for size 1 N (rank at most that of its half-waves)."""
     setting = problem.setting
     readings = problem.middle()

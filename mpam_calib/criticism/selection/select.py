@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mpam_calib.criticism.data.problem import build_problem
+from mpam_calib.criticism.data.build import build_problem
 from mpam_calib.criticism.fitting.noise_scale import settle_noise
 from mpam_calib.criticism.selection.evidence import (
     Weighed,
