@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +24,10 @@ from mpam_calib.posterior.chains.warmup import WarmUp, warm_up
 from mpam_calib.posterior.density.batch import batch_size
 from mpam_calib.posterior.density.collapsed import Collapsed
 from mpam_calib.posterior.density.mode import Mode
-from mpam_calib.posterior.density.pool import workers
+from mpam_calib.posterior.density.pool import Workers, workers
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 ENSEMBLES = 4
 BLOCK = 40
@@ -90,45 +93,22 @@ def sample(
     taken over and the draws are those of an uninterrupted run.
     """
     tell = listener or (lambda progress: None)
-    seeds = [int(s.generate_state(1)[0]) for s in np.random.SeedSequence(seed).spawn(ENSEMBLES)]
     blocks: list[list[Block]] = []
     with workers(target, ENSEMBLES) as pool:
-
-        def run(states: list[EnsembleState], moves: Moves, steps: int) -> list[Block]:
-            return pool.map(advance, [(state, moves, steps) for state in states])
-
-        warm: WarmUp | None = checkpoint.load("warm_up") if checkpoint else None
-        if warm is None:
-            tell(Progress("warming up", 0, float("nan"), 0.0, 0.0))
-            walkers = walkers_for(target)
-            warm = warm_up(
-                target,
-                modes,
-                starts=lambda mixture: start_states(target, mixture, walkers, seeds),
-                run=run,
-                evaluate=lambda u: np.concatenate(pool.map(evaluate_held, np.array_split(u, ENSEMBLES))),
-                seed=seeds[0],
-            )
-            if checkpoint:
-                checkpoint.save("warm_up", warm)
-        states = warm.states
-        steps, due = 0, BLOCK
+        warm = _warmed_up(target, modes, seed, pool, checkpoint, tell)
+        states, steps, due = warm.states, 0, BLOCK
         while True:
-            name = f"block_{len(blocks):05d}"
             size = min(BLOCK, max_steps - steps)
             # Only whole blocks are stored: one that this budget cuts short is drawn whole by a larger one.
             store = checkpoint if size == BLOCK else None
-            block: list[Block] | None = store.load(name) if store else None
-            if block is None:
-                block = run(states, warm.moves, size)
-                if store:
-                    store.save(name, block)
+            draw = partial(_advance, pool, states, warm.moves, size)
+            block = _kept(store, f"block_{len(blocks):05d}", draw)
             states = [b.state for b in block]
             blocks.append(block)
             steps += size
             if steps < min(due, max_steps):
                 continue
-            chain = np.concatenate([np.stack([b.chain for b in part]) for part in blocks], axis=1)
+            chain = _joined([[b.chain for b in part] for part in blocks])
             figures = diagnose_chains(chain)
             ess = figures.ess_min
             in_time = steps >= due and size == BLOCK
@@ -137,6 +117,52 @@ def sample(
             enough = figures.meets(ess_wanted) and (warm.fits or steps >= LEAST)
             if enough or steps >= max_steps:
                 break
-    log_prob = np.concatenate([np.stack([b.log_prob for b in part]) for part in blocks], axis=1)
+    log_prob = _joined([[b.log_prob for b in part] for part in blocks])
     acceptance = float(np.mean([b.accepted for part in blocks for b in part]))
     return Sampling(chain, log_prob, figures, warm.modes, acceptance, warm.accepted, not (enough and in_time))
+
+
+def _warmed_up(
+    target: Collapsed,
+    modes: list[Mode],
+    seed: int,
+    pool: Workers,
+    checkpoint: Checkpoint | None,
+    tell: Listener,
+) -> WarmUp:
+    """The ensembles after their warm-up, each with a seed of its own."""
+    seeds = [int(s.generate_state(1)[0]) for s in np.random.SeedSequence(seed).spawn(ENSEMBLES)]
+
+    def warm() -> WarmUp:
+        tell(Progress("warming up", 0, float("nan"), 0.0, 0.0))
+        walkers = walkers_for(target)
+        return warm_up(
+            target,
+            modes,
+            starts=lambda mixture: start_states(target, mixture, walkers, seeds),
+            run=partial(_advance, pool),
+            evaluate=lambda u: np.concatenate(pool.map(evaluate_held, np.array_split(u, ENSEMBLES))),
+            seed=seeds[0],
+        )
+
+    return _kept(checkpoint, "warm_up", warm)
+
+
+def _advance(pool: Workers, states: list[EnsembleState], moves: Moves, steps: int) -> list[Block]:
+    """All ensembles so many steps further."""
+    return pool.map(advance, [(state, moves, steps) for state in states])
+
+
+def _kept(store: Checkpoint | None, name: str, make: Callable[[], T]) -> T:
+    """The part that is stored under a name; else what ``make`` makes, stored where there is a store."""
+    found: T | None = store.load(name) if store else None
+    if found is None:
+        found = make()
+        if store:
+            store.save(name, found)
+    return found
+
+
+def _joined(parts: list[list[Array]]) -> Array:
+    """Arrays (T, ...) by block and ensemble as one (E, all T, ...)."""
+    return np.concatenate([np.stack(part) for part in parts], axis=1)
