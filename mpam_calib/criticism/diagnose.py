@@ -129,7 +129,7 @@ def diagnose(
 def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
     """The content of ``diagnosis.json``."""
     verdict, budget, gain = diagnosis.verdict, diagnosis.budget, diagnosis.gain
-    content: dict[str, Any] = {
+    return {
         "verdict": verdict.word,
         "probability": _round(verdict.probabilities.get(verdict.standing, 0.0)),
         "causes": [_cause(diagnosis, e, seed) for e in diagnosis.causes],
@@ -142,7 +142,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "misfit_before_N": _round(budget.before),
         "misfit_after_N": _round(budget.after),
         "remainder_N": _round(budget.remainder),
-        "gain": None,
+        "gain": None if gain is None else _gain(gain),
         "structure": [
             {
                 "against": before.against,
@@ -168,23 +168,25 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
             "largest": LARGEST,
         },
     }
-    if gain is not None:
-        content["gain"] = {
-            "held_out": gain.held_out,
-            "rmse_before_N": _round(gain.rmse_before),
-            "rmse_after_N": _round(gain.rmse_after),
-            "rmse_named_N": _round(gain.rmse_named),
-            "elpd_gain": _round(gain.elpd_gain),
-            "elpd_gain_se": _round(gain.elpd_gain_se),
-            "elpd_gain_named": _round(gain.elpd_gain_named),
-            "elpd_gain_named_se": _round(gain.elpd_gain_named_se),
-            "coverage90_before": _round(gain.coverage90_before),
-            "coverage90_after": _round(gain.coverage90_after),
-            "coverage90_named": _round(gain.coverage90_named),
-            "folds_same_set": gain.folds_same_set,
-            "folds": gain.folds,
-        }
-    return content
+
+
+def _gain(gain: Gain) -> dict[str, Any]:
+    """What the extended model gains on held-out rows."""
+    return {
+        "held_out": gain.held_out,
+        "rmse_before_N": _round(gain.rmse_before),
+        "rmse_after_N": _round(gain.rmse_after),
+        "rmse_named_N": _round(gain.rmse_named),
+        "elpd_gain": _round(gain.elpd_gain),
+        "elpd_gain_se": _round(gain.elpd_gain_se),
+        "elpd_gain_named": _round(gain.elpd_gain_named),
+        "elpd_gain_named_se": _round(gain.elpd_gain_named_se),
+        "coverage90_before": _round(gain.coverage90_before),
+        "coverage90_after": _round(gain.coverage90_after),
+        "coverage90_named": _round(gain.coverage90_named),
+        "folds_same_set": gain.folds_same_set,
+        "folds": gain.folds,
+    }
 
 
 def _cause(diagnosis: Diagnosis, identifier: str, seed: int) -> dict[str, Any]:

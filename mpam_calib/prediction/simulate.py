@@ -57,7 +57,7 @@ class Simulated:
 
 
 class _Tested(NamedTuple):
-    """A specimen with loops, and what made them."""
+    """A specimen with the rows of a test, and what makes their forces."""
 
     specimen: Specimen
     model: Model
@@ -86,31 +86,30 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
     demand_whole("--seed", seed, 0)
     hide = checked_sizes(hide)
     rng = np.random.default_rng([seed, 8])
-    fitted = specimen.has_muscle_data
-    if not fitted and (specimen.geometry is None or specimen.simulation.E_Pa is None):
-        raise InputError(
-            specimen.folder / "specimen.toml",
-            "neither a muscle's data nor E_Pa",
-            "one of them, to simulate from",
-        )
-    if fitted and specimen.loops is None and specimen.force_map is None:
-        raise InputError(
-            specimen.folder / "specimen.toml",
-            "neither loops nor a force map",
-            "one of them, whose rows to simulate",
-        )
-    if fitted:
-        blueprint = draw_blueprint(specimen, AS_DECLARED, material_of(specimen))
-        values, eta = _mode(specimen, blueprint.model_copy(update={"options": FITTED}), rng)
-        values = {name: values[name] for name in build_model(blueprint).names}
-        # What the declared simulation misses is no noise: that is told beside a remainder.
-        beside, _ = _mode(specimen, blueprint.model_copy(update={"options": Options()}), rng)
-        values |= {name: beside[name] for name in NOISES if name in beside}
-        model, hidden = with_hidden(blueprint, values, hide, specimen)
+    _demand_rows(specimen)
+    if specimen.has_muscle_data:
+        test = _fitted(specimen, hide, rng)
     else:
-        specimen, model, hidden, values, eta = _settled(replace(specimen, levels_Pa=LEVELS), hide)
+        test = _settled(replace(specimen, levels_Pa=LEVELS), hide)
+    return _recorded(test, hide, rng)
+
+
+def _demand_rows(specimen: Specimen) -> None:
+    """Raise ``InputError`` where there are no rows to simulate, and nothing to make them from."""
+    declared = specimen.folder / "specimen.toml"
+    if not specimen.has_muscle_data:
+        if specimen.geometry is None or specimen.simulation.E_Pa is None:
+            found = "neither a muscle's data nor E_Pa"
+            raise InputError(declared, found, "one of them, to simulate from")
+    elif specimen.loops is None and specimen.force_map is None:
+        raise InputError(declared, "neither loops nor a force map", "one of them, whose rows to simulate")
+
+
+def _recorded(test: _Tested, hide: Mapping[str, float | None], rng: np.random.Generator) -> Simulated:
+    """What a load cell makes of the forces at the rows of a test."""
+    specimen, model, values = test.specimen, test.model, test.values
     assert model.chain is not None and model.setting is not None
-    eta, scale = eta[:, : model.linear_sizes[0]], model.setting.force_scale
+    eta, scale = test.eta[:, : model.linear_sizes[0]], model.setting.force_scale
     loops, grid = specimen.loops, specimen.force_map
     floor = specimen.sensors.force_floor_N
     rows = [] if loops is None else [row_readings(loops)]
@@ -128,14 +127,20 @@ def simulate(specimen: Specimen, hide: Mapping[str, float | None] | None = None,
         force = model.chain.force(values, eta, rows[-1])[0]
         reading, slack = _read(force, None, values, scale, floor, rng)
         grid = replace(grid, force_N=reading, censored=slack)
-    result = replace(
-        specimen,
-        loops=loops,
-        force_map=grid,
-        blocked_force=None,
-        free_contraction=None,
-    )
-    return Simulated(result, hidden, _put_in(model, values, eta), unseen)
+    made = replace(specimen, loops=loops, force_map=grid, blocked_force=None, free_contraction=None)
+    return Simulated(made, test.hidden, _put_in(model, values, eta), unseen)
+
+
+def _fitted(specimen: Specimen, hide: Mapping[str, float | None], rng: np.random.Generator) -> _Tested:
+    """The specimen's own test, with the mode that is fitted to its data."""
+    blueprint = draw_blueprint(specimen, AS_DECLARED, material_of(specimen))
+    values, eta = _mode(specimen, blueprint.model_copy(update={"options": FITTED}), rng)
+    values = {name: values[name] for name in build_model(blueprint).names}
+    # What the declared simulation misses is no noise: that is told beside a remainder.
+    beside, _ = _mode(specimen, blueprint.model_copy(update={"options": Options()}), rng)
+    values |= {name: beside[name] for name in NOISES if name in beside}
+    model, hidden = with_hidden(blueprint, values, hide, specimen)
+    return _Tested(specimen, model, hidden, values, eta)
 
 
 def _mode(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from mpam_calib.calibration import calibrate
+from mpam_calib.calibration import Calibration, calibrate
 from mpam_calib.model.blueprint import Options
 from mpam_calib.posterior.chains.convergence import ESS_WANTED
 from mpam_calib.posterior.chains.sampling import MAX_STEPS, Listener, Progress
@@ -17,22 +17,6 @@ from mpam_calib.run.odd import tell_odd
 from mpam_calib.run.replaced import tell_replaced
 from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
-
-
-def _told_first(run: Path, specimen: Specimen, source: str | Path, tell: Listener) -> Listener:
-    """A listener that says what looks odd and whose page goes once there are steps.
-
-    Until then data may be refused, and that is told in one line.
-    """
-    notes = iter([run])
-
-    def listener(progress: Progress) -> None:
-        if progress.steps and next(notes, None):
-            tell_replaced(run, "calibration")
-            tell_odd(specimen, source)
-        tell(progress)
-
-    return listener
 
 
 @dataclass(frozen=True)
@@ -72,12 +56,8 @@ def calibrate_to_folder(
     )
     folder = RunFolder(run, digest)
     demand_own(run, RUN_FILE, KEPT_FILE)
-    state = folder.state()
-    if state is not None and folder.complete():
-        used = int(state["sampling"]["steps"])
-        cut = bool(state["sampling"].get("cut", False))
-        if max_steps <= used or (state["converged"] and not cut):
-            return Outcome(bool(state["converged"]), kept=True)
+    if (kept := _kept(folder, max_steps)) is not None:
+        return kept
     demand_writable(run)
     tell = listener or (lambda progress: None)
     tell(Progress("fitting", 0, float("nan"), 0.0, 0.0))
@@ -95,6 +75,40 @@ def calibrate_to_folder(
     figures = calibration.sampling.diagnostics
     steps = calibration.sampling.chain.shape[1]
     tell(Progress("reporting", steps, float(figures.rhat.max()), figures.ess_min, 1.0))
+    _write(folder, calibration)
+    return Outcome(calibration.converged, kept=False)
+
+
+def _told_first(run: Path, specimen: Specimen, source: str | Path, tell: Listener) -> Listener:
+    """A listener that says what looks odd and whose page goes once there are steps.
+
+    Until then data may be refused, and that is told in one line.
+    """
+    notes = iter([run])
+
+    def listener(progress: Progress) -> None:
+        if progress.steps and next(notes, None):
+            tell_replaced(run, "calibration")
+            tell_odd(specimen, source)
+        tell(progress)
+
+    return listener
+
+
+def _kept(folder: RunFolder, max_steps: int) -> Outcome | None:
+    """How a finished run in the folder ended, where the budget would not change it; else None."""
+    state = folder.state()
+    if state is None or not folder.complete():
+        return None
+    used = int(state["sampling"]["steps"])
+    cut = bool(state["sampling"].get("cut", False))
+    if max_steps <= used or (state["converged"] and not cut):
+        return Outcome(bool(state["converged"]), kept=True)
+    return None
+
+
+def _write(folder: RunFolder, calibration: Calibration) -> None:
+    """Put the results in place of what was there; everything is made before anything goes."""
     from mpam_calib.report.calibration import calibration_page
     from mpam_calib.run.view import view_of
 
@@ -102,8 +116,7 @@ def calibrate_to_folder(
     view = view_of(calibration, bands)
     page = calibration_page(view)
     folder.clear()
-    page.write(run / REPORT)
+    page.write(folder.path / REPORT)
     folder.write(calibration, bands, view.left_out)
     if calibration.converged:
         folder.checkpoint.clear()
-    return Outcome(calibration.converged, kept=False)
