@@ -8,7 +8,7 @@ import pytest
 from mpam_calib.model.distinct import over_distinct
 from mpam_calib.model.effect import effect
 
-from .test_literature_forms import rows, setting_for, start
+from .forms import rows, setting_for, start
 
 PRESLIDING = ["presliding", *(f"presliding:{form}" for form in effect("presliding").forms)]
 

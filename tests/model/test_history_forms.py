@@ -13,32 +13,10 @@ from mpam_calib.model.readings import FAR, Readings
 from mpam_calib.model.state import Setting
 from mpam_calib.physics.kinematics import SHAPES
 
-from .test_literature_forms import LEVELS, SPEED, rows, setting_for, start
+from .forms import SPEED, STEPS, driven, one, setting_for, start
 
-STEPS = 400
-"""Readings of a stroke."""
 TURN = 50
 """Steps of an integration on either side of a turn."""
-
-
-def driven(setting: Setting, strokes: int = 4) -> Readings:
-    """Triangles at one speed and one pressure, from a rest at no contraction."""
-    way = (np.arange(STEPS) + 0.5) / STEPS * setting.stroke
-    number = np.repeat(np.arange(strokes), STEPS)
-    x = np.concatenate([way if i % 2 == 0 else setting.stroke - way for i in range(strokes)])
-    return replace(
-        rows(setting, len(x)),
-        pressure=np.full(len(x), LEVELS[-1] * 1e3),
-        displacement=x,
-        sign=np.where(number % 2 == 0, -1.0, 1.0),
-        cycle=number // 2 + 1.0,
-        travel=np.tile(way, strokes),
-        reversal=(number > 0).astype(float),
-        strokes_before=np.where(number[:, None] > [0, 1], setting.stroke, FAR),
-        behind=np.maximum.accumulate(x) - x,
-        speed=np.full(len(x), SPEED),
-        pace=np.full(len(x), SPEED),
-    )
 
 
 def small_steps(readings: Readings, setting: Setting) -> list[np.ndarray]:
@@ -52,10 +30,6 @@ def small_steps(readings: Readings, setting: Setting) -> list[np.ndarray]:
         np.concatenate([np.full(TURN, b * t / TURN), np.full(TURN, -s * w / TURN)])
         for b, t, s, w in zip(before, turning, readings.sign, way, strict=True)
     ]
-
-
-def one(value: float) -> np.ndarray:
-    return np.full((1, 1), value)
 
 
 @pytest.mark.parametrize("share", [0.02, 0.1, 0.2])
