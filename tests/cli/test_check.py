@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from criticism.test_hypotheses import specimen_of
+from criticism.cases import specimen_of
 
 from mpam_calib.cli.check import _missing
 

@@ -7,7 +7,7 @@ import pytest
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.data.rows import Rows
 
-from .test_hypotheses import null_recipe, problem_of, specimen_of
+from .cases import null_recipe, problem_of, specimen_of
 
 
 @pytest.fixture(scope="module")

@@ -9,42 +9,29 @@ Every case is one line of ``reports/gains_<set>.csv``; a second run goes on.
 
 from __future__ import annotations
 
-import csv
 import sys
-import tempfile
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from rig import case as rig_case
 from rig import recipes, sets
 from rig.oracle import Oracle
 
+from criticism.cases import diagnosed_problem_of, read_case
 from criticism.found import search
-from mpam_calib.criticism.data.build import build_problem
+from criticism.resumed import completed, reported
 from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.folds import folds_of
 from mpam_calib.criticism.gain import measure_gain
 from mpam_calib.criticism.searching.candidates import HISTORY, candidates
-from mpam_calib.criticism.searching.usual_braid import with_strands
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
-from mpam_calib.model.blueprint import Options, draw_blueprint
-from mpam_calib.posterior.density.pool import settle_worker
-from mpam_calib.specimen import read
 from mpam_calib.specimen.recording import Specimen
 
 FIELDS = [
     "name", "word", "causes", "held_out", "rmse_before_N", "rmse_after_N", "rmse_named_N",
     "rmse_oracle_N", "coverage90_before", "coverage90_after", "coverage90_named", "folds_same_set", "folds",
 ]  # fmt: skip
-
-
-def problem_of(specimen: Specimen) -> Problem:
-    """The reduced rows of a specimen."""
-    blueprint = with_strands(draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
-    return build_problem(specimen, blueprint)
 
 
 def oracle_rmse(recording: rig_case.Recording, specimen: Specimen, problem: Problem, by_cycle: bool) -> float:
@@ -58,7 +45,7 @@ def oracle_rmse(recording: rig_case.Recording, specimen: Specimen, problem: Prob
         held = np.isin(raw, part)
         fitted = Oracle(recording, ~held).fit(recording.case.ids, known)
         # The same reduction of the oracle's force as of the readings.
-        force = problem_of(replace(specimen, loops=replace(loops, force_N=fitted.force))).force
+        force = diagnosed_problem_of(replace(specimen, loops=replace(loops, force_N=fitted.force))).force
         squares.append((force - problem.force)[np.isin(reduced, part)] ** 2)
     return float(np.sqrt(np.mean(np.concatenate(squares))))
 
@@ -66,15 +53,13 @@ def oracle_rmse(recording: rig_case.Recording, specimen: Specimen, problem: Prob
 def measure(recipe: recipes.Recipe) -> list[str] | None:
     """One line of the table; None where the case is refused, names nothing or loses readings to a floor."""
     one = recipes.build_case(recipe)
-    with tempfile.TemporaryDirectory() as folder:
-        rig_case.write_case(one, Path(folder) / "specimen", Path(folder) / "truth.json")
-        try:
-            specimen = read(Path(folder) / "specimen")
-        except InputError:
-            return None
+    try:
+        specimen = read_case(one)
+    except InputError:
+        return None
     if specimen.loops is None or specimen.loops.censored.any():
         return None
-    problem = problem_of(specimen)
+    problem = diagnosed_problem_of(specimen)
     tested = candidates(problem).tested
     found = search(problem, tested)
     verdict = judge(found)
@@ -99,21 +84,9 @@ def measure(recipe: recipes.Recipe) -> list[str] | None:
 
 def main(which: str, count: int, workers: int = 2) -> None:
     """Measure the first ``count`` cases with hidden effects, then print medians over all lines there are."""
-    path = Path(__file__).parents[2] / "reports" / f"gains_{which}.csv"
-    path.parent.mkdir(exist_ok=True)
-    done = list(csv.DictReader(path.open())) if path.exists() else []
-    names = {row["name"] for row in done}
     chosen = [r for r in sets.recipes(which) if r.group == "separable" and not r.outside]
     chosen = sorted(chosen, key=lambda r: r.seed)[:count]
-    with path.open("a", newline="") as file, ProcessPoolExecutor(workers, initializer=settle_worker) as pool:
-        writer = csv.writer(file, lineterminator="\n")
-        if not done:
-            writer.writerow(FIELDS)
-        for line in pool.map(measure, [r for r in chosen if r.name not in names]):
-            if line is not None:
-                writer.writerow(line)
-                file.flush()
-    rows = list(csv.DictReader(path.open()))
+    rows = completed(reported(f"gains_{which}.csv"), FIELDS, chosen, measure, workers)
     for label in ("before", "after", "named"):
         cover = np.array([float(r[f"coverage90_{label}"]) for r in rows])
         print(f"coverage of 90 % bands {label}: median {np.median(cover):.3f}, mean {cover.mean():.3f}")

@@ -8,11 +8,9 @@ rate that it prints has its binomial (Wilson) interval.
 
 from __future__ import annotations
 
-import csv
 import sys
-import tempfile
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -23,18 +21,15 @@ from rig import case as rig_case
 from rig import margins, recipes, sets
 from rig.effects import form as rig_form
 
+from criticism.cases import diagnosed_problem_of, read_case
 from criticism.found import search
-from mpam_calib.criticism.data.build import build_problem
+from criticism.resumed import completed, reported
 from mpam_calib.criticism.searching.candidates import candidates
 from mpam_calib.criticism.searching.searched import Search
-from mpam_calib.criticism.searching.usual_braid import with_strands
 from mpam_calib.criticism.sizes import DRAWS, sizes_of
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.errors import InputError
-from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.effect import effect
-from mpam_calib.posterior.density.pool import settle_worker
-from mpam_calib.specimen import read
 from mpam_calib.units import si_factor
 
 FIELDS = ["name", "group", "truth", "outside", "word", "named", "listed", "probability", "inside", "sized"]
@@ -86,20 +81,14 @@ def score_case(recipe: recipes.Recipe, which: str = "") -> Scored:
         one = recipes.halved(one)
     elif which.endswith(BENT):
         one = replace(one, bent=1)
-    with tempfile.TemporaryDirectory() as folder:
-        rig_case.write_case(one, Path(folder) / "specimen", Path(folder) / "truth.json")
-        try:
-            specimen = read(Path(folder) / "specimen")
-        except InputError:  # a muscle that pushes is refused at the door
-            truth = frozenset(one.ids)
-            return Scored(
-                one.name, one.group, truth, one.outside is not None, "refused", frozenset(), (), 0.0
-            )
-    blueprint = with_strands(draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
-    problem = build_problem(specimen, blueprint)
+    truth = frozenset(one.ids)
+    try:
+        specimen = read_case(one)
+    except InputError:  # a muscle that pushes is refused at the door
+        return Scored(one.name, one.group, truth, one.outside is not None, "refused", frozenset(), (), 0.0)
+    problem = diagnosed_problem_of(specimen)
     found = search(problem, candidates(problem).tested)
     verdict = judge(found)
-    truth = frozenset(one.ids)
     named_right = bool(truth) and verdict.word == "named" and verdict.standing == truth
     inside, sized = _inside(found, truth, one) if named_right else (0, 0)
     told = {verdict.standing, *verdict.others()}
@@ -245,24 +234,19 @@ def draw_calibration(scored: list[Scored], path: Path) -> None:
     figure.savefig(path, metadata={"Date": None})
 
 
+def _score_line(recipe: recipes.Recipe, which: str) -> list[str]:
+    return _row(score_case(recipe, which))
+
+
 def main(which: str, shard: int = 0, shards: int = 1, workers: int = 2) -> None:
     """Score what is not scored yet, then print the rates of all that is."""
-    path = Path(__file__).parents[2] / "reports" / f"score_{which}.csv"
-    path.parent.mkdir(exist_ok=True)
-    done = list(csv.DictReader(path.open())) if path.exists() else []
-    names = {row["name"] for row in done}
-    todo = [r for r in sets.recipes(plain(which))[shard::shards] if r.name not in names]
+    path = reported(f"score_{which}.csv")
+    todo = sets.recipes(plain(which))[shard::shards]
     if plain(which) != which:
         todo = [r for r in todo if r.effects and not r.outside]
-    todo.sort(key=lambda r: r.seed)  # so that what an interrupted run has done is a fair sample
-    with path.open("a", newline="") as file, ProcessPoolExecutor(workers, initializer=settle_worker) as pool:
-        writer = csv.writer(file, lineterminator="\n")
-        if not done:
-            writer.writerow(FIELDS)
-        for scored in pool.map(score_case, todo, [which] * len(todo)):
-            writer.writerow(_row(scored))
-            file.flush()
-    everything = [_parsed(row) for row in csv.DictReader(path.open())]
+    todo = sorted(todo, key=lambda r: r.seed)  # so that what an interrupted run has done is a fair sample
+    lines = completed(path, FIELDS, todo, partial(_score_line, which=which), workers)
+    everything = [_parsed(line) for line in lines]
     for what, hits, of in rates(everything, which) + by_margin(everything, which):
         low, high = wilson(hits, of)
         share = hits / of if of else float("nan")

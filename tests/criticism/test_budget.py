@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from criticism.test_hypotheses import problem_of, specimen_of
+from criticism.cases import problem_of, specimen_of
 from mpam_calib.criticism.budget import misfit_budget, remainder_rms, structured
 from mpam_calib.criticism.data.problem import SIZES
 from mpam_calib.criticism.fitting.fit import fit

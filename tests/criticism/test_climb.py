@@ -17,7 +17,7 @@ from mpam_calib.criticism.fitting.fit import chain_for
 from mpam_calib.criticism.fitting.forms import forms_of
 from mpam_calib.criticism.searching.candidates import candidates
 
-from .test_hypotheses import problem_of, specimen_of
+from .cases import problem_of, specimen_of
 
 
 @pytest.fixture(scope="module", params=["coulomb", "strand"])

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
-
 import numpy as np
 from rig import case as rig_case
 from rig.muscle import Braid, Geometry, Law, Muscle, Simulation
 from rig.protocol import Protocol
 
-from criticism.test_hypotheses import problem_of
+from criticism.cases import problem_of, read_case
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import fit
-from mpam_calib.specimen import read
 
 MODULI = (145e3, 4.2e3, 1.3e3)
 THICK = Muscle(
@@ -41,9 +37,7 @@ def problem(noise_N: float) -> Problem:
     )
     hidden = (rig_case.Hidden("braid_angle", "uniform", -2.8),)
     one = rig_case.Case("thick", 1, "separable", THICK, protocol, hidden)
-    folder = Path(tempfile.mkdtemp())
-    rig_case.write_case(one, folder / "specimen", folder / "truth.json")
-    return problem_of(read(folder / "specimen"))
+    return problem_of(read_case(one))
 
 
 def test_moduli_that_stand_in_for_a_cause_do_not_bend_the_rows() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rig import sets
 
-from criticism.test_hypotheses import problem_of, specimen_of
+from criticism.cases import problem_of, specimen_of
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.doubt import DOUBTS
 from mpam_calib.criticism.fitting.fit import Fit, Under, by_equations, chain_for, doubt_columns, fit

@@ -11,7 +11,7 @@ from model import build
 from rig import sets
 from scipy import special, stats
 
-from criticism.test_hypotheses import problem_of, specimen_of
+from criticism.cases import problem_of, specimen_of
 from mpam_calib.criticism.data.problem import SIZE_PRIOR, SIZES, Problem
 from mpam_calib.criticism.fitting.fit import Fit, fit
 from mpam_calib.criticism.fitting.hypothesis import Hypothesis

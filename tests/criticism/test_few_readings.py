@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from model.build import loops, specimen, with_force
 
-from criticism.test_hypotheses import problem_of
+from criticism.cases import problem_of
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.data.rows import Rows
 from mpam_calib.criticism.searching.candidates import candidates

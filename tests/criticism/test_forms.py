@@ -8,9 +8,7 @@ best form leaves, in nats, is what further causes would be named for.
 from __future__ import annotations
 
 import random
-import tempfile
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,14 +17,12 @@ from rig import effects, recipes, sets
 from rig.effects import textbook
 from rig.recipes import Recipe, Wanted
 
-from mpam_calib.criticism.data.build import build_problem
+from criticism.cases import problem_of, read_case
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.fitting.forms import forms_of
 from mpam_calib.criticism.searching.searched import STARTS
-from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.effect import effect
-from mpam_calib.specimen import read
 
 NATS = 20.0
 """Misfit of noise-free curves (half the whitened sum of squares) that a doubt of some percent covers."""
@@ -51,10 +47,7 @@ EVERY = [(f.id, f.name) for f in textbook.FORMS] + [
 
 
 def _problem(one: rig_case.Case) -> Problem:
-    folder = Path(tempfile.mkdtemp())
-    rig_case.write_case(one, folder / "specimen", folder / "truth.json")
-    specimen = read(folder / "specimen")
-    return build_problem(specimen, draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
+    return problem_of(read_case(one))
 
 
 def _recorded(identifier: str, name: str) -> Problem:

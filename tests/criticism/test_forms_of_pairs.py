@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from criticism.test_hypotheses import null_recipe, problem_of, specimen_of
+from criticism.cases import null_recipe, problem_of, specimen_of
 from criticism.test_sizes import force_with
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import Fit, fit

@@ -17,7 +17,7 @@ from mpam_calib.criticism.unexplained.faults import faults_of
 from mpam_calib.criticism.unexplained.hum import hum_rms
 from mpam_calib.criticism.verdict import judge
 
-from .test_hypotheses import problem_of, specimen_of
+from .cases import problem_of, specimen_of
 from .test_structure import NULLS, left
 
 Array = NDArray[np.float64]

@@ -2,43 +2,23 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rig import case as rig_case
 from rig import recipes, sets
 from scipy import stats
 
-from mpam_calib.criticism.data.build import build_problem
+from criticism.cases import null_recipe, problem_of, specimen_of
 from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import chain_for, fit
 from mpam_calib.criticism.fitting.predicted import linearise
 from mpam_calib.criticism.searching.candidates import candidates
 from mpam_calib.model.bend import is_bend
-from mpam_calib.model.blueprint import Options, draw_blueprint
 from mpam_calib.model.chain import Chain
 from mpam_calib.model.effect import effect, known_effects
-from mpam_calib.specimen import Specimen, read
-
-
-def specimen_of(name: str, which: str = "develop") -> Specimen:
-    recipe = next(r for r in sets.recipes(which) if r.name == name)
-    one = recipes.build_case(recipe)
-    folder = Path(tempfile.mkdtemp())
-    rig_case.write_case(one, folder / "specimen", folder / "truth.json")
-    return read(folder / "specimen")
-
-
-def null_recipe() -> recipes.Recipe:
-    """A muscle with tensile moduli in which nothing is hidden."""
-    return next(r for r in sets.recipes("develop") if r.group == "null" and r.moduli == "tensile")
-
-
-def problem_of(specimen: Specimen) -> Problem:
-    return build_problem(specimen, draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
+from mpam_calib.specimen import read
 
 
 def test_one_place_and_the_row_s_bow_are_enough(problem: Problem) -> None:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from criticism.cases import problem_of, specimen_of
 from criticism.found import search
-from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.searching.searched import Search, best_first
 from mpam_calib.criticism.selection.select import Selection, select
 from mpam_calib.criticism.tasks import journal as module

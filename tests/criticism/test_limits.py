@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from numpy.typing import NDArray
-from rig import case as rig_case
 from rig import recipes, sets
 from rig.effects import form as rig_form
 from scipy import integrate, linalg
@@ -27,7 +24,7 @@ from mpam_calib.model.effect import effect
 from mpam_calib.specimen import read
 from mpam_calib.units import si_factor
 
-from .test_hypotheses import problem_of, specimen_of
+from .cases import problem_of, read_case, specimen_of
 
 Array = NDArray[np.float64]
 
@@ -171,10 +168,8 @@ def test_small_sizes_of_another_rig_are_inside(share: float, least: int) -> None
         form = rig_form(hidden.id, hidden.form)
         if not form.shared or form.parameter in ("", "next_order"):
             continue
-        with tempfile.TemporaryDirectory() as folder:
-            small = replace(one, hidden=(replace(hidden, size=share * hidden.size),))
-            rig_case.write_case(small, Path(folder) / "specimen", Path(folder) / "truth.json")
-            found = problem_of(read(Path(folder) / "specimen"))
+        small = replace(one, hidden=(replace(hidden, size=share * hidden.size),))
+        found = problem_of(read_case(small))
         bands = hidden_sizes(found, [hidden.id], fit(found, NOTHING, 0))
         if hidden.id in bands:
             low, high = np.array(bands[hidden.id]) / si_factor(form.parameter)

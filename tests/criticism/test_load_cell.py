@@ -16,7 +16,7 @@ from mpam_calib.criticism.unexplained.load_cell import FAULT, LATE, load_cell_ri
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.model.effect import known_effects
 
-from .test_hypotheses import problem_of, specimen_of
+from .cases import problem_of, specimen_of
 
 Array = NDArray[np.float64]
 RIVALS = ("rig_compliance", "wall_pressure", "braid_stretch", "dead_band")

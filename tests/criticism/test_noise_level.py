@@ -11,7 +11,7 @@ from scipy import signal
 
 from mpam_calib.criticism.data.noise_windows import between_strokes
 
-from .test_hypotheses import problem_of, specimen_of
+from .cases import problem_of, specimen_of
 
 CURVED = ("develop-separable-006", "develop-separable-022", "develop-null-009", "develop-null-015")
 """Short strokes, sines and dwells, whose own curve passed for a fifth more noise than there is, and more."""

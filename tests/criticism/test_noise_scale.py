@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from model import build
 
+from criticism.cases import problem_of, specimen_of
 from criticism.test_evidence import loops_of_a_rig
-from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import Fit, fit
 from mpam_calib.criticism.fitting.noise_scale import noise_scale, settle_noise

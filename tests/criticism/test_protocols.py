@@ -6,10 +6,8 @@ misfit for which other causes would be named.
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,12 +17,10 @@ from rig import recipes
 from rig.effects import shared_form
 from rig.recipes import Recipe, Wanted
 
-from mpam_calib.criticism.data.build import build_problem
+from criticism.cases import problem_of, read_case
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.fitting.forms import forms_of
-from mpam_calib.model.blueprint import Options, draw_blueprint
-from mpam_calib.specimen import read
 
 MULTIPLE = 5.0
 """Times the noise by which the cause moves the force."""
@@ -61,10 +57,7 @@ EVERY = [c for c in product(CAUSES, ("coulomb", "strand"), DRIVEN, WRITTEN) if _
 
 
 def _problem(one: rig_case.Case) -> Problem:
-    with tempfile.TemporaryDirectory() as folder:
-        rig_case.write_case(one, Path(folder) / "specimen", Path(folder) / "truth.json")
-        specimen = read(Path(folder) / "specimen")
-    return build_problem(specimen, draw_blueprint(specimen, Options(nuisances=False, remainder=False)))
+    return problem_of(read_case(one))
 
 
 def left(cause: str | None, friction: str, driven: str, written: str) -> float:

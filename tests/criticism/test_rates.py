@@ -9,8 +9,8 @@ import pytest
 from model import build
 from rig import sets
 
+from criticism.cases import problem_of, specimen_of
 from criticism.own_rates import made_with_rates_of_its_own
-from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.climb import Climb
 from mpam_calib.criticism.fitting.fit import chain_for, fit

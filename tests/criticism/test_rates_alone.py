@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from rig import sets
 
+from criticism.cases import problem_of, specimen_of
 from criticism.own_rates import made_with_rates_of_its_own
-from criticism.test_hypotheses import problem_of, specimen_of
 from criticism.test_rates import SIZE, held_pressures, plain, rates_of
 from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import fit

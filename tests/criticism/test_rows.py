@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from model.build import loops
-from rig import case as rig_case
 from rig import recipes
 
-from criticism.test_hypotheses import null_recipe, problem_of
+from criticism.cases import null_recipe, problem_of, read_case
 from mpam_calib.criticism.data import build as module
 from mpam_calib.criticism.data import rows
 from mpam_calib.model.readings import Readings
 from mpam_calib.posterior.likelihood.points import Points
 from mpam_calib.report.wording import left_aside
-from mpam_calib.specimen import Specimen, read
+from mpam_calib.specimen import Specimen
 
 CYCLES = 40
 
@@ -36,9 +33,7 @@ def durable() -> Specimen:
         motion="triangle",
         floor=False,
     )
-    folder = Path(tempfile.mkdtemp())
-    rig_case.write_case(recipes.build_case(recipe), folder / "specimen", folder / "truth.json")
-    return read(folder / "specimen")
+    return read_case(recipes.build_case(recipe))
 
 
 def test_long_strokes_are_looked_at_both_ways() -> None:

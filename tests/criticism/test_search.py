@@ -12,8 +12,8 @@ from rig import case as rig_case
 from rig.effects import shared_form
 from rig.recipes import Recipe, Wanted, build_case
 
+from criticism.cases import problem_of, specimen_of
 from criticism.found import search
-from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.climb import Climb, Place
 from mpam_calib.criticism.fitting.fit import chain_for, doubt_on_rows, fit

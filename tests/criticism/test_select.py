@@ -13,9 +13,9 @@ import pytest
 from rig import sets
 from scipy import stats
 
+from criticism.cases import problem_of, specimen_of
 from criticism.order_four import draw_case
 from criticism.own_rates import made_with_rates_of_its_own
-from criticism.test_hypotheses import problem_of, specimen_of
 from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.fitting.fit import Fit, fit
 from mpam_calib.criticism.selection import ranking, space

@@ -10,7 +10,7 @@ import pytest
 from rig import sets
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from criticism.test_hypotheses import problem_of, specimen_of
+from criticism.cases import problem_of, specimen_of
 from mpam_calib.criticism.fitting.refits import best_of
 from mpam_calib.criticism.tasks import spread as module
 from mpam_calib.criticism.tasks.spread import Alone, held_problem, spread_over

@@ -12,7 +12,7 @@ from criticism.found import search
 from mpam_calib.criticism.verdict import Verdict, judge
 from mpam_calib.specimen.recording import Loops
 
-from .test_hypotheses import problem_of, specimen_of
+from .cases import problem_of, specimen_of
 
 HISTORIES = ("creep", "stress_softening", "force_drift")
 Array = NDArray[np.float64]

@@ -24,7 +24,7 @@ from mpam_calib.specimen import Specimen
 from mpam_calib.specimen.extremes import saturated
 from mpam_calib.specimen.recording import BlockedForce
 
-from .test_hypotheses import problem_of, specimen_of
+from .cases import problem_of, specimen_of
 
 Array = NDArray[np.float64]
 NULLS = ("develop-null-000", "develop-null-001", "develop-null-003", "develop-null-007")

@@ -9,8 +9,8 @@ from rig import case as rig_case
 from rig import recipes
 from rig.muscle import polynomial_stress
 
+from criticism.cases import null_recipe
 from criticism.found import search
-from criticism.test_hypotheses import null_recipe
 from mpam_calib.criticism.data.build import build_problem
 from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import fit

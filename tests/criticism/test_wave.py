@@ -15,8 +15,8 @@ from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.unexplained.wave import wave_rms
 from mpam_calib.criticism.verdict import judge
 
+from .cases import problem_of, specimen_of
 from .test_hum import FILTERS, noise_of
-from .test_hypotheses import problem_of, specimen_of
 from .test_structure import NULLS, left
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+from criticism.cases import problem_of
 from criticism.test_evidence import dense, inside
-from criticism.test_hypotheses import problem_of
 from mpam_calib.criticism.data.problem import SIZE_PRIOR
 from mpam_calib.criticism.fitting.hypothesis import Hypothesis
 from mpam_calib.criticism.selection import ranking, space

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from criticism.test_hypotheses import problem_of, specimen_of
+from criticism.cases import problem_of, specimen_of
 
 from mpam_calib.model.effect import effect
 from mpam_calib.report.blocks import DataTable, Notice, Text

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from criticism.test_hypotheses import problem_of, specimen_of
+from criticism.cases import problem_of, specimen_of
 
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.unexplained.load_cell import FAULT

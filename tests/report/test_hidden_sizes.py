@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from criticism.test_hypotheses import problem_of, specimen_of
+from criticism.cases import problem_of, specimen_of
 
 from mpam_calib.model.effect import effect
 from mpam_calib.model.priors import Parameter

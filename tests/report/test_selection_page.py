@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from criticism.test_hypotheses import specimen_of
+from criticism.cases import specimen_of
 
 from mpam_calib.criticism.selection.held_out import LEVEL_COLUMNS
 from mpam_calib.criticism.selection.odds import odds
