@@ -28,6 +28,10 @@ Parameters = Callable[[Setting], tuple[Parameter, ...]]
 """An effect's parameters for a setting."""
 Values = Mapping[str, Array]
 """Parameter values by name, SI units, shape (B, 1)."""
+Apply = Callable[[State, Values, Setting], State]
+"""What an effect makes of the chain's state."""
+Share = Callable[[State, Values, Setting], Array]
+"""How much of an effect there is at each reading, (B or 1, n): in what the forms of one differ."""
 
 
 class Stage(IntEnum):
@@ -73,8 +77,8 @@ class Effect:
     sentence: str
     source: str
     parameters: Parameters
-    apply: Callable[[State, Values, Setting], State]
-    forms: Mapping[str, Callable[[State, Values, Setting], State]] = field(default_factory=dict)
+    apply: Apply
+    forms: Mapping[str, Apply] = field(default_factory=dict)
     told_by: str = ""
     uses_force: bool = False
     needs_braid: bool = False

@@ -149,9 +149,13 @@ class NormalWithin:
         _demand_order("NormalWithin", self.low, self.high)
 
     @property
+    def _ends(self) -> Array:
+        """The bounds in sds from the mean, (2,)."""
+        return (np.array([self.low, self.high]) - self.mean) / self.scale
+
+    @property
     def _shares(self) -> tuple[float, float]:
-        ends = (np.array([self.low, self.high]) - self.mean) / self.scale
-        below, above = special.ndtr(ends)
+        below, above = special.ndtr(self._ends)
         return float(below), float(above - below)
 
     def from_normal(self, u: Array) -> Array:
@@ -169,8 +173,7 @@ class NormalWithin:
     @property
     def sd(self) -> float:
         """Standard deviation."""
-        ends = (np.array([self.low, self.high]) - self.mean) / self.scale
-        return float(stats.truncnorm.std(*ends, scale=self.scale))
+        return float(stats.truncnorm.std(*self._ends, scale=self.scale))
 
     def describe(self, factor: float = 1.0) -> str:
         """One phrase."""

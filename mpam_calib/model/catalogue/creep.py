@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.curves import box_cox, settled
-from mpam_calib.model.effect import Effect, Parameters, Stage, Values, register
+from mpam_calib.model.effect import Apply, Effect, Parameters, Share, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.readings import TIMES
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
-Decades = Callable[[State, Values, Setting], Array]
-Apply = Callable[[State, Values, Setting], State]
 
 ONSET = 1.0
 """Seconds after which relaxation is counted."""
@@ -113,7 +109,7 @@ def _time(setting: Setting) -> Parameter:
     return Parameter("relaxation_s", LogNormal(0.4 * _middle(setting), 1.0), "time of relaxation")
 
 
-def _whole(decades: Decades) -> Apply:
+def _whole(decades: Share) -> Apply:
     """The whole force relaxes along such decades."""
 
     def apply(state: State, values: Values, setting: Setting) -> State:
@@ -123,7 +119,7 @@ def _whole(decades: Decades) -> Apply:
     return apply
 
 
-def _bladder(decades: Decades) -> Apply:
+def _bladder(decades: Share) -> Apply:
     """The bladder's stress alone relaxes along them."""
 
     def apply(state: State, values: Values, setting: Setting) -> State:

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.model.curves import half_test, middle_pressure, power, settled
-from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.effect import Apply, Effect, Share, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
+
+Array = NDArray[np.float64]
 
 GAIN: Final = 0.02
 """Prior scale of a displacement's gain error: ISO 9513 allows 1 % in class 1 and 2 % in class 2. Far more
@@ -25,10 +27,19 @@ def _apply(state: State, values: Values, setting: Setting) -> State:
     return state._replace(displacement=state.displacement + values["offset_mm"])
 
 
-def _scale(state: State, values: Values, setting: Setting) -> State:
+def _off_by(part: Share) -> Apply:
+    """The offset is so large a part of itself at each reading, (B or 1, n)."""
+
+    def apply(state: State, values: Values, setting: Setting) -> State:
+        off = values["offset_mm"] * part(state, values, setting)
+        return state._replace(displacement=state.displacement + off)
+
+    return apply
+
+
+def _scale(state: State, values: Values, setting: Setting) -> Array:
     """The crosshead's scale is off: the error goes with the stroke, and is the offset at half of it."""
-    part = state.displacement / _half_stroke(setting)
-    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
+    return np.asarray(state.displacement / _half_stroke(setting))
 
 
 def _gained(setting: Setting) -> tuple[Parameter, ...]:
@@ -36,11 +47,10 @@ def _gained(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("offset_mm", prior, "true shortening minus the reading at half the stroke"),)
 
 
-def _line(state: State, values: Values, setting: Setting) -> State:
+def _line(state: State, values: Values, setting: Setting) -> Array:
     """Zero and scale are both off: the error is a line in the stroke, and the offset at half of it."""
     share = values["scale_share"]
-    part = 1.0 - share + share * state.displacement / _half_stroke(setting)
-    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
+    return np.asarray(1.0 - share + share * state.displacement / _half_stroke(setting))
 
 
 def _scale_share(setting: Setting) -> tuple[Parameter, ...]:
@@ -57,10 +67,9 @@ def _usual(setting: Setting) -> float:
     return 0.02 * setting.geometry.L0
 
 
-def _slip(state: State, values: Values, setting: Setting) -> State:
+def _slip(state: State, values: Values, setting: Setting) -> Array:
     """The grips slip early in the test, and then hold: the offset at half the test."""
-    part = settled(state.readings.time, values["slip_s"], half_test(setting))
-    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
+    return np.asarray(settled(state.readings.time, values["slip_s"], half_test(setting)))
 
 
 def _slip_time(setting: Setting) -> tuple[Parameter, ...]:
@@ -68,29 +77,27 @@ def _slip_time(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("slip_s", prior, "time in which the grips settle"),)
 
 
-def _seating(state: State, values: Values, setting: Setting) -> State:
+def _seating(state: State, values: Values, setting: Setting) -> Array:
     """The end fittings seat themselves under pressure: the offset is off by a power of it."""
-    part = power(state.pressure / middle_pressure(setting), values["offset_exponent"])
-    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
+    return np.asarray(power(state.pressure / middle_pressure(setting), values["offset_exponent"]))
 
 
 def _exponent(setting: Setting) -> tuple[Parameter, ...]:
     return (Parameter("offset_exponent", Normal(0.0, 0.5), "power of the pressure", "textbook", ""),)
 
 
-def _settling(state: State, values: Values, setting: Setting) -> State:
+def _settling(state: State, values: Values, setting: Setting) -> Array:
     """There from the start, and more or less of it at first."""
-    return _excessive(state, values, np.exp(-state.readings.time / values["slip_s"]))
+    return _excessive(values, np.exp(-state.readings.time / values["slip_s"]))
 
 
-def _bedding(state: State, values: Values, setting: Setting) -> State:
+def _bedding(state: State, values: Values, setting: Setting) -> Array:
     """The same by the count of cycles: the grips bed in as they are loaded."""
-    return _excessive(state, values, np.exp((1.0 - state.readings.test_cycle) / values["bedding_cycles"]))
+    return _excessive(values, np.exp((1.0 - state.readings.test_cycle) / values["bedding_cycles"]))
 
 
-def _excessive(state: State, values: Values, fading: NDArray[np.float64]) -> State:
-    part = 1.0 + values["offset_excess"] * fading
-    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
+def _excessive(values: Values, fading: Array) -> Array:
+    return np.asarray(1.0 + values["offset_excess"] * fading)
 
 
 def _bedding_in(setting: Setting) -> tuple[Parameter, ...]:
@@ -106,12 +113,11 @@ def _more_at_first() -> Parameter:
     return Parameter("offset_excess", Normal(0.0, 0.7), "what is more of it at first, as a share", "", "")
 
 
-def _rezeroed(state: State, values: Values, setting: Setting) -> State:
+def _rezeroed(state: State, values: Values, setting: Setting) -> Array:
     """The crosshead is zeroed anew at every level; between levels it is off as on average."""
     parts = [np.asarray(values[p.name]) for p in _parts(setting)]
     table = np.concatenate([*parts, sum(parts) / len(parts)], axis=-1)
-    part = table[..., state.readings.level]
-    return state._replace(displacement=state.displacement + values["offset_mm"] * part)
+    return np.asarray(table[..., state.readings.level])
 
 
 def _parts(setting: Setting) -> tuple[Parameter, ...]:
@@ -135,13 +141,13 @@ register(
         memory=False,
         of_test=True,
         forms={
-            "scale": _scale,
-            "line": _line,
-            "slip": _slip,
-            "settling": _settling,
-            "bedding": _bedding,
-            "seating": _seating,
-            "rezeroed": _rezeroed,
+            "scale": _off_by(_scale),
+            "line": _off_by(_line),
+            "slip": _off_by(_slip),
+            "settling": _off_by(_settling),
+            "bedding": _off_by(_bedding),
+            "seating": _off_by(_seating),
+            "rezeroed": _off_by(_rezeroed),
         },
         own={
             "scale": _gained,

@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 
 from mpam_calib.model.curves import STEEPEST
 from mpam_calib.model.distinct import over_distinct
-from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.effect import Apply, Effect, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, Normal, Parameter
 from mpam_calib.model.readings import FAR, Readings
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
-Apply = Callable[[State, Values, Setting], State]
 
 OWN = ("reversal_mm", "dahl_exponent", "wen_exponent", "reversal_exponent")
 """Parameters of its equations: the reversal, and the exponent that some of them have."""

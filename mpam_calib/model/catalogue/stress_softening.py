@@ -9,16 +9,13 @@ from numpy.typing import NDArray
 from scipy import special
 
 from mpam_calib.model.curves import level_stroke
-from mpam_calib.model.effect import Effect, Stage, Values, register
+from mpam_calib.model.effect import Apply, Effect, Share, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, LongTailed, Normal, NormalWithin, Parameter
 from mpam_calib.model.state import Setting, State
 
 Array = NDArray[np.float64]
-Apply = Callable[[State, Values, Setting], State]
-Share = Callable[[State, Values, Setting], Array]
-"""How much of the excess is left, (B or 1, n), from 1 to 0."""
 Fading = Callable[[Array, Values], Array]
-"""The same from cycle to cycle."""
+"""How much of the excess is left from cycle to cycle, from 1 to 0."""
 
 POWERS = ("power", "force-power", "test-power", "test-force-power")
 REACHING = ("virgin", "fresh", "test-virgin", "test-force-virgin")
