@@ -10,7 +10,17 @@ import pytest
 import mpam_calib
 
 LAYERS = (
-    *("errors", "units", "arviz_import", "physics", "specimen", "model", "posterior", "criticism"),
+    *(
+        "errors",
+        "units",
+        "arviz_import",
+        "atomic_files",
+        "physics",
+        "specimen",
+        "model",
+        "posterior",
+        "criticism",
+    ),
     *("prediction", "design", "report", "thesis", "calibration", "run", "cli", "__init__", "__main__"),
 )
 ROOT = Path(mpam_calib.__file__).parent

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpam_calib.arviz_import import import_arviz
+from mpam_calib.atomic_files import write_atomically
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.model import Model, build_model
-from mpam_calib.posterior.chains.checkpoint import write_atomically
 from mpam_calib.posterior.draws import Draws, Reported
 from mpam_calib.specimen.effect_ids import forms_of_id, known_effect_ids
 from mpam_calib.specimen.wording import listed, quoted

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import jinja2
 
-from mpam_calib.posterior.chains.checkpoint import write_atomically
+from mpam_calib.atomic_files import write_atomically
 from mpam_calib.report.blocks import Block, Notice, Section
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import tomlkit
 
+from mpam_calib.atomic_files import write_atomically
 from mpam_calib.criticism.diagnose import Diagnosis, Tell, describe, diagnose, extended_effects
 from mpam_calib.criticism.tasks.journal import Journal
 from mpam_calib.errors import InputError
-from mpam_calib.posterior.chains.checkpoint import write_atomically
 from mpam_calib.posterior.material import demand_other, keep_material, material_of
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.report.diagnosis import diagnosis_page

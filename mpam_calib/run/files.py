@@ -9,8 +9,8 @@ from typing import Any
 
 import pandas as pd
 
+from mpam_calib.atomic_files import write_atomically
 from mpam_calib.errors import InputError
-from mpam_calib.posterior.chains.checkpoint import write_atomically
 from mpam_calib.posterior.stored import POSTERIOR, RUN_FILE
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.specimen.toml_source import SPECIMEN_FILE

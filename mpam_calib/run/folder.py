@@ -12,9 +12,10 @@ from typing import Any
 
 import pandas as pd
 
+from mpam_calib.atomic_files import sweep
 from mpam_calib.calibration import Calibration
 from mpam_calib.model.effect import effect, known_effects
-from mpam_calib.posterior.chains.checkpoint import Checkpoint, sweep
+from mpam_calib.posterior.chains.checkpoint import Checkpoint
 from mpam_calib.posterior.stored import POSTERIOR, RUN_FILE, readable, write_draws
 from mpam_calib.prediction.recorded import RECORDED, Recorded
 from mpam_calib.run.asked import LEFT_OUT, kept_left_out

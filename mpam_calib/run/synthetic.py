@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import tomlkit
 
+from mpam_calib.atomic_files import write_atomically
 from mpam_calib.errors import InputError
-from mpam_calib.posterior.chains.checkpoint import write_atomically
 from mpam_calib.posterior.material import keep_material
 from mpam_calib.prediction.simulate import Simulated
 from mpam_calib.run.files import demand_folder, write_csv, write_json

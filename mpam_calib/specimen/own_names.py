@@ -26,11 +26,16 @@ _FIRST_WORDS: Final = {
 _WORD_AND_UNIT: Final = re.compile(r"(?P<word>[^\W\d_]+)[\s_]*[\[(/]?\s*(?P<unit>[^\[\]()]*?)\s*[\])]?\s*")
 
 
+def written_names(spec: TableSpec, mapping: Mapping[str, Column]) -> dict[str, str]:
+    """How a file writes the names of a table's columns: as they are mapped, else as they are."""
+    return {name: mapping[name].name or name if name in mapping else name for name in spec.columns}
+
+
 def refuse_missing(
     label: str, row: int, header: Sequence[str], spec: TableSpec, mapping: Mapping[str, Column]
 ) -> None:
     """Raise ``InputError`` (``row`` is the header's) unless all required and all mapped columns are there."""
-    wanted = {name: mapping[name].name or name if name in mapping else name for name in spec.columns}
+    wanted = written_names(spec, mapping)
     missing = [
         name
         for name, written in wanted.items()

@@ -11,7 +11,7 @@ from pathlib import Path
 from mpam_calib.errors import InputError
 from mpam_calib.specimen.declaration import Column, Csv
 from mpam_calib.specimen.misread import refuse_thousands
-from mpam_calib.specimen.own_names import means_how_many, refuse_missing
+from mpam_calib.specimen.own_names import means_how_many, refuse_missing, written_names
 from mpam_calib.specimen.tables import TEXT_COLUMNS, TableSpec
 from mpam_calib.specimen.units_row import are_units, check_header_units, is_units_row
 from mpam_calib.specimen.wording import listed, os_reason, quoted
@@ -82,7 +82,7 @@ def detect_format(
         lines.pop()  # cut off in the middle
     if not any(line.strip() for line in lines):
         raise InputError(label, "an empty file", f"a header with {listed(spec.required)} and rows below it")
-    wanted = {name: mapping[name].name or name if name in mapping else name for name in spec.columns}
+    wanted = written_names(spec, mapping)
     row, delimiter = _header(lines, declared, spec, set(wanted.values()))
     header = _split(lines[row], delimiter)
     fields = _fields(label, row + 1, header, spec, mapping, wanted)

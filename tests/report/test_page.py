@@ -13,7 +13,7 @@ import pytest
 from markupsafe import Markup
 from matplotlib.figure import Figure as MplFigure
 
-from mpam_calib.posterior.chains.checkpoint import sweep
+from mpam_calib.atomic_files import sweep
 from mpam_calib.report.blocks import (
     DataTable,
     Figure,

@@ -13,10 +13,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mpam_calib.atomic_files import sweep, write_atomically
 from mpam_calib.criticism.selection.held_out import LEVEL_COLUMNS
 from mpam_calib.errors import Interrupted
-from mpam_calib.posterior.chains.checkpoint import Checkpoint, pack, sweep, unpack, write_atomically
+from mpam_calib.posterior.chains.checkpoint import Checkpoint
 from mpam_calib.posterior.chains.ensembles import Block, EnsembleState
+from mpam_calib.posterior.chains.packing import pack, unpack
 from mpam_calib.posterior.chains.proposal import StudentMixture
 from mpam_calib.posterior.density.mode import Mode
 from mpam_calib.posterior.evidence.bridge import Bridge
@@ -159,7 +161,7 @@ def test_a_pickle_is_never_run(checkpoint: Checkpoint, tmp_path: Path) -> None:
 def test_only_values_of_this_package_are_built(
     name: str, checkpoint: Checkpoint, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from mpam_calib.posterior.chains import checkpoint as module
+    from mpam_calib.posterior.chains import packing as module
 
     forged = {"class": name, "fields": {}}
     monkeypatch.setattr(module, "_encode", lambda part, store: forged)
@@ -187,7 +189,7 @@ def test_what_another_process_is_writing_is_not_swept(tmp_path: Path) -> None:
     table = tmp_path / "table.csv"
     code = (
         "import sys; from pathlib import Path;"
-        "from mpam_calib.posterior.chains.checkpoint import write_atomically;"
+        "from mpam_calib.atomic_files import write_atomically;"
         "write_atomically(Path(sys.argv[1]), lambda p: (p.write_text('whole'), print('begun', flush=True),"
         "sys.stdin.read()))"
     )
