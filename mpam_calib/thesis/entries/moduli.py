@@ -19,7 +19,9 @@ def enter(ledger: Ledger) -> None:
     _lines(ledger)
     lost_table(ledger, table("4.7"), f"{FROM_MEASUREMENT}; this number decodes the curve of its level")
     _exponentials(ledger)
-    _force_of_the_laws(ledger)
+    _printed_laws(ledger)
+    _cancelling_moduli(ledger)
+    _line_of_every_digit(ledger)
 
 
 def recovered(k: int, level: int) -> tuple[float, float]:
@@ -166,7 +168,7 @@ def _exponentials(ledger: Ledger) -> None:
         )
 
 
-def _force_of_the_laws(ledger: Ledger) -> None:
+def _printed_laws(ledger: Ledger) -> None:
     """What the printed constants do to the blocked force (γ = 0), level by level."""
     exponential = laws.double_exponential(table("4.9").values(), laws.P_KPA)
     cases = (
@@ -199,6 +201,10 @@ def _force_of_the_laws(ledger: Ledger) -> None:
             sd,
             f"four digits each; the law is off by {laws.force_error('MPAM2', exponential)[i]:+.1f} N there",
         )
+
+
+def _cancelling_moduli(ledger: Ledger) -> None:
+    """The tabled moduli beside their sum, which is what acts at rest length."""
     for muscle, name in decoded.MUSCLES.items():
         E = decoded.moduli(muscle)
         for P, row in zip(laws.P_KPA, E, strict=True):
@@ -209,6 +215,10 @@ def _force_of_the_laws(ledger: Ledger) -> None:
                 float(row.sum()),
                 f"their sizes add up to {np.abs(row).sum():.2e} Pa: they cancel",
             )
+
+
+def _line_of_every_digit(ledger: Ledger) -> None:
+    """What the line of Table 4.4 is worth before its constants are rounded."""
     full = laws.force_error("MPAM1", laws.full_line())
     for i, P in enumerate(laws.P_KPA):
         ledger.unprinted(
