@@ -237,7 +237,7 @@ def _check_plausible(file: DataFile, frame: pd.DataFrame, geometry: Geometry) ->
     if "branch" not in frame:
         check_held_length(file.label, displacement, frame["pressure_kPa"].to_numpy(), rows)
     check_force(file.label, "loops", frame["force_N"].to_numpy(), displacement)
-    check_changes(file.label, frame["force_N"].to_numpy())
+    check_changes(file.label, frame["force_N"].to_numpy(), "force_N")
     if "branch" in frame:
         branch = frame["branch"].to_numpy().astype(np.int64)
         check_branch(file.label, branch, displacement * MM, rows)

@@ -67,11 +67,11 @@ def check_force(label: str, kind: FileKind, force_N: Floats, shortening: Floats 
         raise InputError(label, found, expected, None, "force_N")
 
 
-def check_changes(label: str, force_N: Floats) -> None:
-    """Refuse loops whose force never changes."""
-    if np.ptp(force_N) == 0.0 and len(force_N) > 1:
-        found = f"a force that never changes ({force_N[0]:g} throughout)"
-        raise InputError(label, found, "the load cell's readings", None, "force_N")
+def check_changes(label: str, values: Floats, column: str) -> None:
+    """Refuse a force (N) or a stress (Pa), whatever was done to the test piece, that never changes."""
+    if np.ptp(values) == 0.0 and len(values) > 1:
+        found = f"a {column.partition('_')[0]} that never changes ({values[0]:g} throughout)"
+        raise InputError(label, found, "the load cell's readings", None, column)
 
 
 def check_branch(label: str, branch: Ints, displacement_m: Floats, rows: Ints) -> None:

@@ -13,6 +13,7 @@ from mpam_calib.specimen.declaration import Geometry
 from mpam_calib.specimen.levels import medians_by_label, static_levels
 from mpam_calib.specimen.loops import censored_rows
 from mpam_calib.specimen.plausibility import (
+    check_changes,
     check_codes,
     check_contraction,
     check_force,
@@ -86,6 +87,7 @@ def read_tensile(files: Sequence[DataFile]) -> tuple[Tensile, tuple[int, ...]]:
             raise InputError(file.label, found, expected, None, "stress_Pa")
         check_codes(file.label, frame)
         check_strain(file.label, frame["strain"].to_numpy(), frame.index.to_numpy())
+        check_changes(file.label, frame["stress_Pa"].to_numpy(), "stress_Pa")
         frames.append(frame)
     rows = pd.concat(frames, ignore_index=True)
     return Tensile(rows["strain"].to_numpy(), rows["stress_Pa"].to_numpy()), tuple(map(len, frames))

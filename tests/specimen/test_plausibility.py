@@ -178,6 +178,15 @@ def test_strains_that_tell_nothing_are_refused(strains: tuple[float, ...], said:
     assert refused(make(tmp_path, RUBBER, t=f"strain,stress_Pa\n{rows}")).startswith(said)
 
 
+@pytest.mark.parametrize("stress", [0.0, 4000.0])
+def test_stresses_that_never_change_are_refused(stress: float, tmp_path: Path) -> None:
+    rows = "".join(f"{i / 10},{stress}\n" for i in range(12))
+    assert refused(make(tmp_path, RUBBER, t=f"strain,stress_Pa\n{rows}")) == (
+        f"t.csv:stress_Pa: found a stress that never changes ({stress:g} throughout), expected the load "
+        "cell's readings"
+    )
+
+
 def test_a_nul_in_a_file_s_name_is_refused(tmp_path: Path) -> None:
     declaration = DECLARATION.replace('"loops.csv"', '"lo\\u0000ops.csv"')
     message = refused(make(tmp_path, declaration, loops=loops().text()))
