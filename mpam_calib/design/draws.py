@@ -21,6 +21,7 @@ from mpam_calib.model.state import Setting
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.prediction.beyond import Beyond
 from mpam_calib.prediction.curves import GRID, first_root
+from mpam_calib.prediction.free_moduli import moduli_change
 from mpam_calib.specimen.declaration import Braid
 from mpam_calib.units import DEG, GPA, MM, si_factor
 
@@ -41,7 +42,8 @@ class MuscleDraws:
 
     ``tolerance``: SI deviations (N, 1) from the drawing, by the names of the geometry's values. What
     the run found of its own specimen's geometry, or of its rig, is not carried over; a gauge's offset is,
-    as pressures are those that the gauge reads. ``beyond``: what is not known outside the recorded pressures.
+    as pressures are those that the gauge reads. ``beyond``: what is not known of pressures that
+    were not recorded.
     """
 
     model: Model
@@ -92,14 +94,17 @@ class MuscleDraws:
         """Force (N, n) of designs (n or 1, 3 or 5) at readings (n,), the smooth remainder included."""
         chain, values = self._chain(x), self._values(x)
         p, q, _ = self.model.linear_sizes
-        force = chain.force(values, self.draws.eta[:, :p], readings)
+        eta = self.draws.eta[:, :p]
+        force = chain.force(values, eta, readings)
         if self.model.remainder is not None:
             left = self.draws.eta[:, p : p + q] @ self.model.remainder.columns(readings).T
             left, share = self.draws.values[SMOOTH] * left, self._share(x)
             if self.beyond is not None:
                 # What the remainder comes to is a force of the tested muscle's size.
-                own = force / np.maximum(share, LEAST_SHARE) + left
-                left = left + self.beyond.force(readings, own)
+                size = np.maximum(share, LEAST_SHARE)
+                change = moduli_change(chain, values, eta, readings, self.beyond.unknown)
+                moduli = None if change is None else change / size
+                left = left + self.beyond.force(readings, force / size + left, moduli)
             force = force + left * share
         return force
 

@@ -5,7 +5,8 @@ Below the lowest it goes on in proportion to the pressure, without which nothing
 as it is at the highest; above a single one, which cannot tell, in proportion as well, as a misfit of the
 gas's pull would. To each draw a random function of the contraction is added that nothing has been learnt
 about: of the remainder's own size one level's spacing away, and in proportion to the distance. Where the
-moduli are free at each level, their change is another (:mod:`~mpam_calib.prediction.free_moduli`).
+moduli are free at each level, what they change by is another, between the levels as well
+(:mod:`~mpam_calib.prediction.free_moduli`).
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class Beyond:
     ``pull`` (N/Pa) is the gas's at full length; ``size`` (N, 1), N, the remainder's sd and ``eta`` (N, k) its
     coordinates. ``below`` and ``above`` (N, degrees) are those of the new functions, alike for both branches;
     ``kept`` (N, 1) says how much of what fades below the lowest level stays (one) or turns over, too;
-    ``changed`` (N, 2) how many sds free moduli change below and above.
+    ``unknown`` (N, 2 + levels) says how free moduli change: below, above, and about each level.
     """
 
     remainder: Remainder
@@ -51,7 +52,7 @@ class Beyond:
     below: Array
     above: Array
     kept: Array
-    changed: Array
+    unknown: Array
 
     @classmethod
     def draw(cls, model: Model, draws: Draws, seed: int) -> Beyond | None:
@@ -61,34 +62,32 @@ class Beyond:
         geometry, kinematics = model.setting.geometry, model.setting.simulation.kinematics
         full = SHAPES[kinematics](np.array(geometry.L0), rest_of(geometry))
         p, q, _ = model.linear_sizes
-        rng = np.random.default_rng([seed, STREAM])
-        below, above = rng.standard_normal((2, len(draws), model.remainder.degrees))
+        rng, count, levels = np.random.default_rng([seed, STREAM]), len(draws), model.setting.levels
+        below, above = rng.standard_normal((2, count, model.remainder.degrees))
         return cls(
             remainder=model.remainder,
-            levels=model.setting.levels,
+            levels=levels,
             pull=abs(gas_force(np.array(1.0), full).item()),
             size=draws.values[SMOOTH],
             eta=draws.eta[:, p : p + q],
             below=below,
             above=above,
-            kept=KEPT_SD * rng.standard_normal((len(draws), 1)),
-            changed=rng.standard_normal((len(draws), 2)),
+            kept=KEPT_SD * rng.standard_normal((count, 1)),
+            unknown=np.hstack([rng.standard_normal((count, k)) for k in (2, len(levels))]),
         )
 
     def force(self, readings: Readings, known: Array, moduli: Array | None = None) -> Array:
         """Force (N, n) that comes to the model's, ``known`` (N, n), at readings (n,).
 
-        ``moduli`` (N, n) is that of one sd by which free moduli change. 0 from the lowest to the highest
-        level.
+        ``moduli`` (N, n) is what free moduli change by. Without it 0 from the lowest to the highest level.
         """
-        moduli = np.zeros_like(known) if moduli is None else moduli
+        added = np.zeros_like(known) if moduli is None else moduli.copy()
         P, lowest, highest = readings.pressure, self.levels[0], self.levels[-1]
-        added = np.zeros((len(self.size), len(readings)))
         below, above = np.flatnonzero((lowest > P) & (P >= 0.0)), np.flatnonzero(highest < P)
         if len(below):
-            added[:, below] = self._below(readings.take(below), known[:, below], moduli[:, below])
+            added[:, below] = self._below(readings.take(below), known[:, below], added[:, below])
         if len(above) and highest > 0.0:
-            added[:, above] = self._above(readings.take(above)) + self.changed[:, 1:] * moduli[:, above]
+            added[:, above] += self._above(readings.take(above))
         return added
 
     def _above(self, readings: Readings) -> Array:
@@ -104,7 +103,7 @@ class Beyond:
         edge = self._fitted(replace(readings, pressure=np.full(len(P), lowest)))
         missed = self._along(self.below, readings) * ((lowest - P) / self._spacing)
         # What a wall or the gas is wrong by fades with the pressure; what a dead-band takes does not.
-        missed += self.kept * edge * (1.0 - share) + self.changed[:, :1] * moduli
+        missed += self.kept * edge * (1.0 - share) + moduli
         added: Array = share * edge - self._fitted(readings)
         # Without pressure nothing pulls: what is missed is at most the gas's whole pull. Where a dead-band or
         # a gauge's offset has made up for a misfit the model pulls even there: all of that may be wrong.

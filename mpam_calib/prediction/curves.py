@@ -18,7 +18,7 @@ from mpam_calib.posterior.density.target import predict_force
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.posterior.likelihood.covariance import ROUGH_LENGTH
 from mpam_calib.prediction.beyond import Beyond
-from mpam_calib.prediction.free_moduli import moduli_beyond
+from mpam_calib.prediction.free_moduli import moduli_change
 from mpam_calib.prediction.reading_noise import ReadingNoise
 
 Array = NDArray[np.float64]
@@ -79,16 +79,19 @@ def force_curves(model: Model, draws: Draws, pressures: Array, contractions: Arr
     sign = np.array([1.0, -1.0, 0.0])[None, :, None]
     grid = np.broadcast_arrays(pressures[:, None, None], L0 * contractions[None, None, :], sign)
     readings = Readings.at_rest(*(g.ravel() for g in grid))
-    parts, moduli = [], []
+    beyond, p = Beyond.draw(model, draws, seed), model.linear_sizes[0]
+    parts, changed = [], []
     size = max(1, BATCH_CELLS // len(readings))
     for i in range(0, len(draws), size):
         values = {k: v[i : i + size] for k, v in draws.values.items()}
         parts.append(predict_force(model, values, draws.eta[i : i + size], readings))
-        changed = moduli_beyond(model, values, draws.eta[i : i + size], readings)
-        moduli += [] if changed is None else [changed]
+        if beyond is not None and model.chain is not None:
+            own, unknown = draws.eta[i : i + size, :p], beyond.unknown[i : i + size]
+            change = moduli_change(model.chain, values, own, readings, unknown)
+            changed += [] if change is None else [change]
     force = np.concatenate(parts)
-    if (beyond := Beyond.draw(model, draws, seed)) is not None:
-        force += beyond.force(readings, force, np.concatenate(moduli) if moduli else None)
+    if beyond is not None:
+        force += beyond.force(readings, force, np.concatenate(changed) if changed else None)
     force = force.reshape(len(draws), *shape)
     if ROUGH in draws.values:
         for j, pressure in enumerate(pressures):

@@ -46,7 +46,7 @@ LAWS = {
     "linear": "their straight lines are drawn on",
     "exponential": "their exponentials run on, and grow as exponentials do",
     "exponential_each": "their exponentials run on, and grow as exponentials do",
-    "free": "they are held at the values of the nearest level",
+    "free": "they are held at the nearest level's, give or take what they changed between the last two",
 }
 
 

@@ -15,6 +15,7 @@ from mpam_calib.design.robust import COLUMNS, Design, Optimiser, designs_table
 from mpam_calib.model.blueprint import Blueprint, Options
 from mpam_calib.model.model import Model, build_model
 from mpam_calib.posterior.draws import Draws
+from mpam_calib.prediction.curves import force_curves
 from mpam_calib.specimen.declaration import Braid, Geometry, GeometrySd, Sensors, Simulation
 from mpam_calib.units import DEG, MM
 
@@ -29,7 +30,7 @@ F_BEST = P * np.pi * R**2 * (2.0 * ROOT * np.tan(ALPHA) ** 2 - 0.6)
 X = np.array([2.4 * MM, 0.6 * MM, 66.0 * DEG])
 
 
-def model(sd: float = 0.0, braid: Braid | None = None, **declared: Any) -> Model:
+def model(sd: float = 0.0, braid: Braid | None = None, remainder: bool = False, **declared: Any) -> Model:
     """A muscle of R 3 mm, t 0.7 mm, α 72°, with nothing but what is declared."""
     told: dict[str, Any] = {"effects": (), "friction": "none", "order": 2, "law": "constant"}
     geometry = Geometry(L0_mm=50.0, R0_mm=3.0, t0_mm=0.7, alpha0_deg=72.0, sd=GeometrySd(alpha0_deg=sd))
@@ -48,7 +49,7 @@ def model(sd: float = 0.0, braid: Braid | None = None, **declared: Any) -> Model
             branches=False,
             free_contraction=False,
             tensile_range=None,
-            options=Options(remainder=False, correlated_noise=False),
+            options=Options(remainder=remainder, correlated_noise=False),
         )
     )
 
@@ -293,3 +294,21 @@ def test_a_bound_that_a_design_only_touches_does_not_hold_it(monkeypatch: pytest
     monkeypatch.setattr(robust, "optimality", lambda problem, x: Optimality(touched, {}, 0.0))
     made = model()
     assert {d.held_by for d in Optimiser(made, point(made, 5)).at(P)} == {("R at its upper bound",)}
+
+
+def test_free_moduli_change_between_levels_and_beyond_them() -> None:
+    """At pressures without a level a design's bands are as wide as those of what was tested."""
+    made = model(remainder=True, law="free")
+    rng = np.random.default_rng(3)
+    draws = point(made, 400)
+    p = made.linear_sizes[0]
+    eta = np.zeros_like(draws.eta)
+    eta[:, :p] = rng.standard_normal(p)
+    muscle = MuscleDraws.prepare(made, Draws(draws.u, draws.values, eta, 1), 400, 0)
+    own = np.array([R, 0.7 * MM, ALPHA])
+    gamma = np.linspace(0.05, 0.2, 4)
+    for pressure in (150e3, 200e3, 250e3, 350e3):
+        tested = force_curves(made, muscle.draws, np.array([pressure]), gamma, 0).force[:, 0, 2]
+        assert muscle.curves(pressure, own, gamma) == pytest.approx(tested)
+        spread = muscle.curves(pressure, X, gamma).std(axis=0)
+        assert (spread > 1e-6).all() == (pressure != 200e3)

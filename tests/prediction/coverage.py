@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from model import build
 from rig.chain import force_of
-from rig.muscle import Muscle, static_force
+from rig.muscle import Law, Muscle, static_force
 from rig.protocol import Protocol, Rows, record_rows, sensor_noise
 from rig.specimens import FAMILIES, loops_muscle, sensible, whole_levels
 
@@ -38,13 +39,20 @@ class HeldOut:
     truth: Array
 
 
-def rig_case(seed: int) -> tuple[Muscle, Rows, Array, Array, Protocol]:
-    """A random muscle with a linear law, its rows, the true force and the reading (N)."""
+def rig_case(
+    seed: int, shares: tuple[float, ...] = SHARES, other: Callable[[Law, float], Law] | None = None
+) -> tuple[Muscle, Rows, Array, Array, Protocol]:
+    """A random muscle with a linear law, its rows, the true force and the reading (N).
+
+    ``shares`` are the levels over the highest pressure; ``other`` makes of the law and that (kPa) another.
+    """
     rng = random.Random(f"coverage-{seed}")
     while True:
         family = FAMILIES[rng.choice(sorted(FAMILIES))]
         muscle, top = loops_muscle(family, rng, law="linear", order=rng.choice((1, 2, 3)))
-        levels = whole_levels(SHARES, top)
+        if other is not None:
+            muscle = muscle.with_simulation(law=other(muscle.simulation.law, top))
+        levels = whole_levels(shares, top)
         if sensible(muscle, levels):
             break
     blocked = float(static_force(muscle, top, 0.0)[0])
