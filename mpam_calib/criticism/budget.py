@@ -22,7 +22,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Budget:
-    """Root mean squares (N) of the structured part before and after, of the remainder, and the shares."""
+    """Root mean squares (N) of the structured part before and after, of the remainder, and the shares.
+
+    The remainder is what no cause removes of the part after: 0 to all of it.
+    """
 
     before: float
     after: float
@@ -58,7 +61,8 @@ def misfit_budget(found: Search, causes: Set) -> Budget:
     return Budget(
         before=float(np.sqrt(before)),
         after=float(np.sqrt(worth[causes])),
-        remainder=remainder_rms(problem, fitted),
+        # Beside a remainder the equations bend away from the data: it is no more than they leave alone.
+        remainder=min(remainder_rms(problem, fitted), float(np.sqrt(worth[causes]))),
         noise=_noise(problem, fitted),
         shares=shares,
     )

@@ -106,6 +106,14 @@ def test_newtons_are_root_mean_squares_of_what_the_equations_leave(found: Search
     assert budget.noise == pytest.approx(problem.noise_level.total, rel=0.05)
 
 
+def test_no_more_remains_than_the_equations_leave(found: Search) -> None:
+    """Without causes; beside a remainder the same fit is a worse one, with more for it to hold."""
+    none = frozenset[str]()
+    budget = misfit_budget(found, none)
+    assert remainder_rms(found.problem, found.best_fit(none)) > 1.1 * budget.before
+    assert budget.remainder == budget.after == budget.before
+
+
 def test_noise_is_no_more_than_all_that_is_left_of_the_readings(found: Search) -> None:
     """Noise that is told from windows may be told as far larger: what is periodic seems to last."""
     problem = found.problem
