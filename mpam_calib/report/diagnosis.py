@@ -87,6 +87,7 @@ def _beyond_the_file(found: Diagnosis) -> dict[str, Any]:
     likely = verdict.probabilities.get(verdict.leading, 0.0)
     return {
         "left": verdict.left,
+        "read_N": (float(found.problem.force.min()), float(found.problem.force.max())),
         "left_N": remainder_rms(found.problem, found.search.best_fit(verdict.leading)),
         "leading": {"ids": sorted(verdict.leading), "probability": likely},
     }
@@ -242,7 +243,7 @@ def _alternatives(content: dict[str, Any], found: Diagnosis, specimen: Specimen)
             "set": ", ".join(a["ids"]) or "nothing beyond the declared simulation",
             "probability": probability(a["probability"]),
             "what would tell them apart": telling(
-                set(a["ids"]), {c["id"] for c in content["causes"]}, specimen
+                set(a["ids"]), {c["id"] for c in content["causes"]}, specimen, found.verdict.marginals
             ),
         }
         for a in content["alternatives"][:shown]

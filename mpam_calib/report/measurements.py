@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -55,10 +55,13 @@ def shown_by(identifier: str, specimen: Specimen) -> str:
     return effect(identifier).told_by
 
 
-def telling(one: set[str], other: set[str], specimen: Specimen) -> str:
-    """The measurement for the first effect in which two sets differ: one that either set claims."""
-    found = (shown_by(e, specimen) for e in [*sorted(one - other), *sorted(other - one)])
-    return next((words for words in found if words), "")
+def telling(one: set[str], other: set[str], specimen: Specimen, marginals: Mapping[str, float]) -> str:
+    """The measurement for the likeliest effect in which two sets differ: one that either set claims.
+
+    ``marginals`` are the effects' probabilities over all sets.
+    """
+    differ = sorted(one ^ other, key=lambda e: (-marginals.get(e, 0.0), e))
+    return next((words for e in differ if (words := shown_by(e, specimen))), "")
 
 
 def not_tested(content: dict[str, Any], specimen: Specimen) -> list[Block]:

@@ -64,14 +64,17 @@ def only_recording(content: dict[str, Any]) -> bool:
 
 
 def unremoved(content: dict[str, Any]) -> list[str]:
-    """What no set of causes removes: ``left_N`` is the remainder beside the likeliest set."""
+    """What no set of causes removes.
+
+    ``left_N`` is the remainder beside the likeliest set, ``read_N`` the least and the largest reading.
+    """
     found = []
     if content["saturated_share"] > 0.0:
         share = significant(100.0 * content["saturated_share"])
         found.append(f"the load cell saturates: {share} % of the readings lie at one extreme force")
     found += [said.format(significant(content[name])) for name, said in FAULTS.items() if content[name] > 0.0]
     if content["load_cell"]:
-        found.append(_of_load_cell(**content["load_cell"]))
+        found.append(_of_load_cell(**content["load_cell"], read=content["read_N"]))
     elif content["left_N"] > 0.0 or not (found or content["trace"]):
         # Where no remainder is needed either, the likeliest set's equations lessen nothing.
         size = significant(content["left_N"] or content["misfit_after_N"])
@@ -82,10 +85,18 @@ def unremoved(content: dict[str, Any]) -> list[str]:
     return found
 
 
-def _of_load_cell(fault: str, nats: float, parameters: dict[str, dict[str, float]]) -> str:
+def _of_load_cell(
+    fault: str, nats: float, parameters: dict[str, dict[str, float]], read: tuple[float, float]
+) -> str:
     """What a load cell at fault explains, how large the fault is, and where to look for it."""
     cell, look = CELL_FAULTS[fault]
     if fault in CELL_SIZES:
         name, said = CELL_SIZES[fault]
-        cell += f" ({said.format(significant(parameters[name]['mean'], 2))})"
+        size = parameters[name]["mean"]
+        if fault == FAULT and size < read[0]:
+            # No reading tells where it begins.
+            low, high = (significant(force, 2) for force in read)
+            cell += f" (at all forces read, {low} to {high} N)"
+        else:
+            cell += f" ({said.format(significant(size, 2))})"
     return f"a load cell {cell} explains the readings {'better' if nats > 0.0 else 'nearly as well'}: {look}"

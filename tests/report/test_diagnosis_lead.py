@@ -58,6 +58,7 @@ UNEXPLAINED: dict[str, Any] = CONTENT | {
     "misfit_after_N": 1.3,
     "remainder_N": 2.0,
     "left_N": 2.0,
+    "read_N": (0.0, 50.0),
     "trace": None,
     "alternatives": [],
     "probability": 0.0,

@@ -32,9 +32,8 @@ def test_a_tensile_test_is_asked_for_where_there_is_none(test: object, moduli: s
     """Nor where the moduli are those of a run with one."""
     specimen: Any = SimpleNamespace(tensile=test, simulation=SimpleNamespace(moduli=moduli))
     assert (shown_by(ORDER, specimen) == TEST) != tested
-    assert (telling({ORDER}, set(), specimen) == TEST) != tested
-    assert telling(set(), {"creep", ORDER}, specimen) == effect("creep").told_by
-    assert telling(set(), set(), specimen) == ""
+    assert (telling({ORDER}, set(), specimen, {}) == TEST) != tested
+    assert telling(set(), set(), specimen, {ORDER: 0.9}) == ""
     content: dict[str, Any] = {
         "verdict": "ambiguous",
         "causes": [],
@@ -42,7 +41,7 @@ def test_a_tensile_test_is_asked_for_where_there_is_none(test: object, moduli: s
         "not_tested": [{"id": ORDER, "why": "one level"}],
         "limits": [{"id": ORDER, "parameters": {"next_order": {"q05": -0.1, "q95": 0.1}}}],
     }
-    found: Any = SimpleNamespace(verdict=SimpleNamespace(near=lambda: 1, likeliest=lambda: 1))
+    found: Any = SimpleNamespace(verdict=SimpleNamespace(near=lambda: 1, likeliest=lambda: 1, marginals={}))
     parameter: Any = SimpleNamespace(prior=SimpleNamespace(from_normal=abs), printed_unit="")
     pages = (
         _alternatives(content, found, specimen),
@@ -52,6 +51,16 @@ def test_a_tensile_test_is_asked_for_where_there_is_none(test: object, moduli: s
     for blocks in pages:
         assert (TEST in words_of(blocks)) != tested
         assert ("the tensile test, fitted at a higher order" in words_of(blocks)) == tested
+
+
+def test_what_tells_sets_apart_is_of_the_likeliest_effect_in_which_they_differ() -> None:
+    specimen: Any = SimpleNamespace()
+    marginals = {"creep": 0.4, "rate_friction": 0.9, "tip_shape": 1.0}
+    one, other = {"creep", "tip_shape"}, {"rate_friction", "tip_shape"}
+    for pair in ((one, other), (other, one)):
+        assert telling(*pair, specimen, marginals) == effect("rate_friction").told_by
+        assert telling(*pair, specimen, marginals | {"creep": 0.95}) == effect("creep").told_by
+        assert telling(*pair, specimen, {}) == effect("creep").told_by
 
 
 def test_another_speed_is_asked_for_however_many_there_are() -> None:

@@ -16,6 +16,7 @@ FAULTLESS = {
         ("saturated_share", "repeating_N", "bursts_N", "hum_N", "step_N", "chatter_N", "remainder_N"), 0.0
     ),
     "left_N": 0.0,
+    "read_N": (-1.0, 50.0),
     "misfit_after_N": 0.567,
     "load_cell": None,
     "trace": None,
@@ -41,6 +42,15 @@ def test_a_load_cell_at_fault_is_told_with_how_to_look_at_it(
     (text,) = unremoved(FAULTLESS | {"load_cell": told})
     assert said in text
     assert f"{size} explains the readings {by}" in text
+
+
+def test_a_load_cell_that_gives_way_below_all_readings_is_told_with_their_range() -> None:
+    knee = {"mean": 7.91, "sd": 3.0, "q05": 3.0, "q95": 15.0}
+    content = FAULTLESS | {"load_cell": {"fault": FAULT, "nats": 3.0, "parameters": {"cell_knee_N": knee}}}
+    (text,) = unremoved(content | {"read_N": (38.2, 74.1)})
+    assert "of large forces (at all forces read, 38 to 74 N) explains" in text
+    (text,) = unremoved(content | {"read_N": (0.4, 74.1)})
+    assert "of large forces (from about 7.9 N on) explains" in text
 
 
 def test_every_fault_of_the_load_cell_has_words() -> None:
