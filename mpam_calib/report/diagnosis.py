@@ -22,7 +22,7 @@ from mpam_calib.report.blocks import Block, DataTable, Figure, Section, Text
 from mpam_calib.report.diagnosis_lead import HELD_OUT, first_screen
 from mpam_calib.report.figures import misfit
 from mpam_calib.report.figures.misfit import Floats
-from mpam_calib.report.measurements import not_tested, shown_by, telling
+from mpam_calib.report.measurements import TOO_SMALL, not_tested, shown_by, telling, too_small
 from mpam_calib.report.numbers import probability, significant, with_band
 from mpam_calib.report.page import Page
 from mpam_calib.specimen.recording import Specimen
@@ -229,6 +229,8 @@ def _meaning(identifier: str, form: str) -> str:
 
 def _alternatives(content: dict[str, Any], found: Diagnosis, specimen: Specimen) -> list[Block]:
     near, shown = found.verdict.near(), found.verdict.likeliest()
+    causes = {c["id"] for c in content["causes"]}
+    small = {c["id"] for c in content["causes"] if too_small(c["parameters"])}
     text = (
         f"Other sets within {BESIDE:g} nats of the likeliest (a factor of "
         f"{round(float(np.exp(BESIDE)), -3):,.0f} in probability): {near or 'none'}."
@@ -243,7 +245,7 @@ def _alternatives(content: dict[str, Any], found: Diagnosis, specimen: Specimen)
             "set": ", ".join(a["ids"]) or "nothing beyond the declared simulation",
             "probability": probability(a["probability"]),
             "what would tell them apart": telling(
-                set(a["ids"]), {c["id"] for c in content["causes"]}, specimen, found.verdict.marginals
+                set(a["ids"]), causes, specimen, found.verdict.marginals, small
             ),
         }
         for a in content["alternatives"][:shown]
@@ -296,7 +298,7 @@ def _limits(
             "5 %": significant(band["q05"], 2),
             "95 %": significant(band["q95"], 2),
             "unit": parameters[name].printed_unit,
-            "what would show it": shown_by(e, specimen),
+            "what would show it": TOO_SMALL if too_small({name: band}) else shown_by(e, specimen),
         }
         for e, name, band in bands
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from typing import Any, Final
 
 import numpy as np
@@ -42,6 +42,13 @@ INSTEAD: Final[dict[str, tuple[Callable[[Specimen], bool], str]]] = {
 }
 """What shows an effect where the measurement that does it usually was made already, or cannot be."""
 
+RESOLUTION: Final = {"delta_alpha_deg": 0.5, "offset_mm": 0.05, "tip_factor": 0.1, "droop_percent": 0.5}
+"""Least sizes that the measurements for them tell, in the units written: an angle on a photograph, a
+crosshead where the muscle just goes taut, ends on a photograph, a pressure sensor. Assumed, as usual in a
+lab."""
+
+TOO_SMALL: Final = "too small for the measurement that would tell a larger one"
+
 STAND_IN: Final = "If one of these is there, what it does may have been put down to another cause."
 """At one level a dead-band is as good as a braid angle, and the angle alone is tested."""
 
@@ -55,13 +62,28 @@ def shown_by(identifier: str, specimen: Specimen) -> str:
     return effect(identifier).told_by
 
 
-def telling(one: set[str], other: set[str], specimen: Specimen, marginals: Mapping[str, float]) -> str:
+def too_small(bands: Mapping[str, Mapping[str, float]]) -> bool:
+    """Whether an effect, by the bands of its parameters, is smaller than what its measurement tells."""
+    told = {
+        name: max(abs(band["q05"]), abs(band["q95"])) for name, band in bands.items() if name in RESOLUTION
+    }
+    return bool(told) and all(size < RESOLUTION[name] for name, size in told.items())
+
+
+def telling(
+    one: set[str],
+    other: set[str],
+    specimen: Specimen,
+    marginals: Mapping[str, float],
+    small: Set[str] = frozenset(),
+) -> str:
     """The measurement for the likeliest effect in which two sets differ: one that either set claims.
 
-    ``marginals`` are the effects' probabilities over all sets.
+    ``marginals`` are the effects' probabilities over all sets; ``small`` are too small to be measured.
     """
-    differ = sorted(one ^ other, key=lambda e: (-marginals.get(e, 0.0), e))
-    return next((words for e in differ if (words := shown_by(e, specimen))), "")
+    differ = sorted((one ^ other) - small, key=lambda e: (-marginals.get(e, 0.0), e))
+    none = TOO_SMALL if small & (one ^ other) else ""
+    return next((words for e in differ if (words := shown_by(e, specimen))), none)
 
 
 def not_tested(content: dict[str, Any], specimen: Specimen) -> list[Block]:

@@ -12,7 +12,7 @@ import pytest
 from mpam_calib.model.effect import effect
 from mpam_calib.report.blocks import Block, DataTable, Text
 from mpam_calib.report.diagnosis import _alternatives, _limits
-from mpam_calib.report.measurements import STAND_IN, not_tested, shown_by, telling
+from mpam_calib.report.measurements import STAND_IN, TOO_SMALL, not_tested, shown_by, telling
 
 ORDER = "order_too_low"
 TEST = effect(ORDER).told_by
@@ -61,6 +61,29 @@ def test_what_tells_sets_apart_is_of_the_likeliest_effect_in_which_they_differ()
         assert telling(*pair, specimen, marginals) == effect("rate_friction").told_by
         assert telling(*pair, specimen, marginals | {"creep": 0.95}) == effect("creep").told_by
         assert telling(*pair, specimen, {}) == effect("creep").told_by
+
+
+@pytest.mark.parametrize(("size", "small"), [(0.02, True), (0.6, False)])
+def test_a_size_that_the_measurement_would_not_tell_is_not_sent_there(size: float, small: bool) -> None:
+    specimen: Any = SimpleNamespace()
+    photograph = effect("braid_angle").told_by
+    band = {"delta_alpha_deg": {"mean": 0.0, "sd": size, "q05": -size, "q95": 0.5 * size}}
+    content: dict[str, Any] = {
+        "causes": [{"id": "braid_angle", "parameters": band}],
+        "alternatives": [{"ids": ["creep"], "probability": 0.1}],
+        "limits": [{"id": "braid_angle", "parameters": band}],
+        "not_tested": [],
+    }
+    verdict = SimpleNamespace(near=lambda: 1, likeliest=lambda: 1, marginals={"braid_angle": 0.9})
+    found: Any = SimpleNamespace(verdict=verdict)
+    parameter: Any = SimpleNamespace(prior=SimpleNamespace(from_normal=abs), printed_unit="deg")
+    for blocks, instead in (
+        (_alternatives(content, found, specimen), effect("creep").told_by),
+        (_limits(content, {"delta_alpha_deg": parameter}, specimen), TOO_SMALL),
+    ):
+        assert (photograph in words_of(blocks)) != small
+        assert (instead in words_of(blocks)) == small
+    assert telling({"braid_angle"}, set(), specimen, {}, {"braid_angle"}) == TOO_SMALL
 
 
 def test_another_speed_is_asked_for_however_many_there_are() -> None:
