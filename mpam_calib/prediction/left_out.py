@@ -26,6 +26,7 @@ from mpam_calib.posterior.draws import Draws
 from mpam_calib.posterior.likelihood.floor import pulling
 from mpam_calib.posterior.likelihood.points import KINDS
 from mpam_calib.posterior.likelihood.row_motion import row_readings
+from mpam_calib.prediction.free_moduli import as_others_say
 from mpam_calib.prediction.reading_noise import ReadingNoise
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import KPA
@@ -57,7 +58,8 @@ def levels_left_out(specimen: Specimen, target: Collapsed, draws: Draws, seed: i
 
     ``inside90``: share of the level's readings inside the 90 % band that all other levels give a new reading
     there; ``bias_N`` their mean above the prediction, ``bias_sd_N`` the sd that the prediction gives it, the
-    readings' noise included. Empty where there are fewer than FEWEST levels, or moduli of each level's own.
+    readings' noise included. Moduli, or a friction, of the level's own are what predictions there take.
+    Empty where there are fewer than FEWEST levels.
     """
     return pd.DataFrame(_rows(specimen, target, draws, seed), columns=COLUMNS)
 
@@ -71,7 +73,7 @@ def levels_looked_at(specimen: Specimen) -> Ints:
 
 def _rows(specimen: Specimen, target: Collapsed, draws: Draws, seed: int) -> list[list[object]]:
     levels = specimen.levels_Pa
-    if target.model.setting is None or len(levels) < FEWEST or specimen.simulation.law == "free":
+    if target.model.setting is None or len(levels) < FEWEST:
         return []
     thinned = draws.thin(DRAWS)
     whole = _likelihood(target, thinned)
@@ -157,11 +159,15 @@ def _predict(
     """Force (N, n) at a level with all that the simulation may miss, and readings of it."""
     model, size = fold.model, batch_size(fold)
     assert model.setting is not None and model.chain is not None
-    # Of a friction of its own the other levels say nothing, whatever the draws know of it.
+    # Of friction or moduli of its own the other levels say nothing, whatever the draws know of them.
     values = model.chain.friction.as_others_say(model.values(u), level)
     eta = np.concatenate(
         [fold.linear_draws(model.values(u[i : i + size]), rng) for i in range(0, len(u), size)]
     )
+    if (block := model.moduli) is not None and block.law.name == "free":
+        p = block.size
+        unknown = rng.standard_normal((len(u), 1 + len(block.law.levels)))
+        eta = np.hstack([as_others_say(block, eta[:, :p], level, unknown), eta[:, p:]])
     force = predict_force(model, values, eta, held.places)
     if ROUGH in values:
         force = force + values[ROUGH] * rng.standard_normal(force.shape)

@@ -144,12 +144,22 @@ def test_of_a_map_every_level_is_left_out_and_of_loops_eight(sound):
     assert len(levels_looked_at(looped)) == 8 and levels_looked_at(looped)[[0, -1]].tolist() == [0, 9]
 
 
+def test_moduli_of_a_level_s_own_are_foreseen_from_the_others(sound):
+    """As predictions there take them; the muscle's follow the pressure in a straight line."""
+    simulation = sound.specimen.simulation.model_copy(update={"law": "free"})
+    table = told(calibrate(replace(sound.specimen, simulation=simulation)))
+    inner, straight = (t[~t["extrapolated"]] for t in (table, told(sound)))
+    assert len(table) == 7
+    assert abs(inner["inside90"].mean() - 0.90) < 0.05
+    assert inner["rmse_N"].to_numpy() == pytest.approx(straight["rmse_N"].to_numpy(), rel=0.2)
+    assert (inner["bias_sd_N"] < 4.0 * straight["bias_sd_N"]).all()
+    # Beyond the others the moduli may change by as much again.
+    assert (table["bias_sd_N"][table["extrapolated"]] > 4.0 * inner["bias_sd_N"].max()).all()
+
+
 def test_nothing_to_leave_out(sound):
-    specimen = sound.specimen
-    free = replace(specimen, simulation=specimen.simulation.model_copy(update={"law": "free"}))
-    two = replace(specimen, levels_Pa=specimen.levels_Pa[:2])
-    for other in (free, two):
-        assert levels_left_out(other, sound.target, sound.draws, 0).empty
+    two = replace(sound.specimen, levels_Pa=sound.specimen.levels_Pa[:2])
+    assert levels_left_out(two, sound.target, sound.draws, 0).empty
 
 
 def test_draws_are_reweighted_by_what_the_level_added(sound, monkeypatch: pytest.MonkeyPatch):

@@ -117,9 +117,10 @@ def test_a_cause_whose_equation_is_open_is_told(probability: float, open_: bool)
 
 def test_other_sets_are_counted_without_a_word_that_the_table_contradicts() -> None:
     """Sets at < 0.001 under a cause at > 0.999 are not hard to tell from it."""
-    verdict = SimpleNamespace(near=lambda: 4, likeliest=lambda: 5)
+    verdict = SimpleNamespace(near=lambda: 4, likeliest=lambda: 5, marginals={})
     alternatives = [{"ids": ["dead_band", "presliding"], "probability": 1e-4}]
-    content: dict[str, Any] = {"alternatives": alternatives, "causes": [{"id": "dead_band"}]}
+    causes = [{"id": "dead_band", "parameters": {}}]
+    content: dict[str, Any] = {"alternatives": alternatives, "causes": causes}
     found: Any = SimpleNamespace(verdict=verdict)
     text, _ = _alternatives(content, found, specimen_of("develop-null-006"))
     assert isinstance(text, Text)
