@@ -24,6 +24,7 @@ from mpam_calib.criticism.selection.evidence import (
     under_other_priors,
     weigh,
 )
+from mpam_calib.criticism.tasks.spread import Alone
 from mpam_calib.model.blueprint import Blueprint
 from mpam_calib.model.moduli import rate_names
 from mpam_calib.posterior.density.mode import Mode, evaluate
@@ -196,7 +197,19 @@ def test_leading_models_have_both_hills_of_their_rates(monkeypatch: pytest.Monke
     assert abs(found.bridge.value - exact) < 3.0 * found.bridge.error < 0.3
     monkeypatch.setattr(evidence, "WIDTHS", {"others doubled": WIDTHS["others doubled"]})
     # The wider the priors, the longer and narrower the ridges: one hill is 0.29 nats too few here.
-    assert under_other_priors(problem, blueprint, [best], exact) == pytest.approx([exact_wide], abs=0.05)
+    assert under_other_priors(problem, blueprint, [best], exact, 0) == pytest.approx([exact_wide], abs=0.05)
+
+
+def test_another_seed_has_other_points() -> None:
+    """Figures differ, but by no more than their errors say."""
+    problem = force_map_of_a_constant_law()
+    models = [declared(problem, law=law).simulation for law in ("constant", "exponential", "free")]
+    first, again, other = (ranking.rank_spread(Alone(problem), models, seed=seed) for seed in (0, 0, 1))
+    for one, same, another in zip(first, again, other, strict=True):
+        assert one.log_evidence == same.log_evidence
+        differ = abs(one.log_evidence - another.log_evidence)
+        assert (differ > 0.0) == (one.simulation.law == "exponential")
+        assert differ <= 5.0 * np.hypot(one.error, another.error)
 
 
 def test_a_bridge_that_quadrature_contradicts_is_not_taken() -> None:
@@ -216,7 +229,7 @@ def test_doubled_priors_of_the_moduli_cost_each_a_factor_of_two(problem: Problem
     blueprint = declared(problem, friction="none", order=2, law="constant", effects=())
     every = [fit(problem, frozenset(), 3, None, blueprint)]
     known, _ = log_evidence_beyond_laplace(problem, blueprint, every)
-    narrow, _, wide, *_ = under_other_priors(problem, blueprint, every, known)
+    narrow, _, wide, *_ = under_other_priors(problem, blueprint, every, known, 0)
     n, p = len(problem), len(every[0].eta)
     terms = Hypothesis(problem, blueprint, every[0]).chain.terms({"": np.zeros((1, 1))}, problem.readings)
     fixed = 0.5 * (terms.fixed[0, :n] + terms.fixed[0, n:])

@@ -84,6 +84,7 @@ def log_evidence_beyond_laplace(
     fits: list[Fit],
     worth: float = -np.inf,
     rates: Mapping[int, Rates] = MappingProxyType({}),
+    seed: int = 0,
 ) -> tuple[float, float]:
     """Log evidence, summed over the remainder's sizes, and its standard error.
 
@@ -94,7 +95,7 @@ def log_evidence_beyond_laplace(
     """
     slow = many_parameters(fits) or blueprint.simulation.law == OWN_RATES
     worth = worth if slow else -np.inf
-    terms, inner = _sizes(problem, blueprint, fits, worth=worth, rates=rates)
+    terms, inner = _sizes(problem, blueprint, fits, worth=worth, rates=rates, seed=seed)
     value = _summed(terms)
     return value, _error(terms, {size: found.error for size, (_, found) in inner.items()})
 
@@ -104,7 +105,7 @@ def weigh(problem: Problem, blueprint: Blueprint, fits: list[Fit], seed: int) ->
 
     For models of at most SETTLES parameters.
     """
-    terms, inner = _sizes(problem, blueprint, fits)
+    terms, inner = _sizes(problem, blueprint, fits, seed=seed)
     quadrature = _summed(terms)
     own = _error(terms, {size: found.error for size, (_, found) in inner.items()})
     if not inner:
@@ -115,14 +116,16 @@ def weigh(problem: Problem, blueprint: Blueprint, fits: list[Fit], seed: int) ->
     return Weighed(quadrature, own, Bridge(_summed(terms), error))
 
 
-def under_other_priors(problem: Problem, blueprint: Blueprint, fits: list[Fit], known: float) -> list[float]:
+def under_other_priors(
+    problem: Problem, blueprint: Blueprint, fits: list[Fit], known: float, seed: int
+) -> list[float]:
     """Log evidence for each of WIDTHS; ``known`` is that under the declared ones.
 
     Of many parameters Laplace's approximation says how it changes, though not how large it is.
     """
 
     def total(widths: tuple[float, float], worth: float = -np.inf) -> float:
-        terms, _ = _sizes(problem, blueprint, fits, widths, worth)
+        terms, _ = _sizes(problem, blueprint, fits, widths, worth, seed=seed)
         return _summed(terms)
 
     if many_parameters(fits):
@@ -155,6 +158,7 @@ def _sizes(
     widths: tuple[float, float] = AS_DECLARED,
     worth: float = -np.inf,
     rates: Mapping[int, Rates] = MappingProxyType({}),
+    seed: int = 0,
 ) -> tuple[dict[int, float], dict[int, tuple[Hypothesis, Evidence]]]:
     """Terms of the sum by size, and the densities behind those that were integrated.
 
@@ -182,27 +186,27 @@ def _sizes(
     for size in sorted(modes, key=lambda s: -terms[s]):
         if terms[size] < best - NEGLIGIBLE:
             break
-        integral = _integral(*modes[size], rates.get(size)) if many else _expanded(*modes[size])
+        integral = _integral(*modes[size], rates.get(size), seed) if many else _expanded(*modes[size], seed)
         if not many and not integral.reliable:
-            integral = integrate_refitted(*modes[size])
+            integral = integrate_refitted(*modes[size], seed)
         terms[size] = integral.value + log(SIZE_PRIOR[size])
         inner[size] = modes[size][0], integral
         best = max(best, terms[size])
     return terms, inner
 
 
-def _expanded(density: Density, mode: Mode) -> Evidence:
+def _expanded(density: Density, mode: Mode, seed: int) -> Evidence:
     """The evidence of a few parameters: points only where a bound is near, or the density bent or hilly."""
     expansion, few = expand(density, mode), 1 < len(mode.u) <= FEW
     if expansion.tame and not (few and len(hills(density, mode)) > 1):
         return Evidence(expansion.value, expansion.error, mode.u, mode.covariance)
-    return integrate_refitted(density, mode) if few else integrate(density, mode)
+    return integrate_refitted(density, mode, seed) if few else integrate(density, mode, seed)
 
 
-def _integral(hypothesis: Hypothesis, mode: Mode, rates: Rates | None) -> Evidence:
+def _integral(hypothesis: Hypothesis, mode: Mode, rates: Rates | None, seed: int) -> Evidence:
     """The evidence of a model with many parameters: most of them rates, or annealed."""
-    alone = integrate_rates(rates, hypothesis, mode) if rates is not None else None
-    return alone or anneal(hypothesis, mode)
+    alone = integrate_rates(rates, hypothesis, mode, seed) if rates is not None else None
+    return alone or anneal(hypothesis, mode, seed)
 
 
 def prior_sensitivity(evidence: Array) -> pd.DataFrame:

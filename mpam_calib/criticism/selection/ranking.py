@@ -84,8 +84,12 @@ def rank_spread(
     *,
     tell: Callable[[str, float], None] = lambda stage, share: None,
     always: Callable[[Simulation], bool] = lambda simulation: False,
+    seed: int = 0,
 ) -> list[Ranked]:
-    """:func:`rank` by workers that hold the problem; ``always`` names models that are integrated anyhow."""
+    """:func:`rank` by workers that hold the problem; ``always`` names models that are integrated anyhow.
+
+    ``seed`` is that of the searches for rates and of the integrals' points.
+    """
     groups = _by_law(space)
     plain: list[dict[str, Ranked | None]] = []
     for number, found in enumerate(spread(_fit_plain, groups)):
@@ -98,11 +102,12 @@ def rank_spread(
     tasks = []
     for group, found in zip(groups, plain, strict=True):
         worth = top - PROMISING if _hopeful(found, top) else np.inf
-        tasks.append((group, found.get(FREE), -np.inf if any(always(s) for s in group.values()) else worth))
+        worth = -np.inf if any(always(s) for s in group.values()) else worth
+        tasks.append((group, found.get(FREE), worth, seed))
     for number, rated in enumerate(spread(_fit_rates, tasks)):
         ranked += rated
         tell("ranking", 0.5 + (number + 1) / len(tasks) / 2)
-    ranked = _searched_again(spread, ranked)
+    ranked = _searched_again(spread, ranked, seed)
     top = max(r.log_evidence for r in ranked)
     wanted = [
         i
@@ -110,7 +115,9 @@ def rank_spread(
         if r.log_evidence >= top - (NEAR if len(r.best.u) < SETTLES else LEADING) or always(r.simulation)
     ]
     free = _free(ranked)
-    asked = [(ranked[i], free(ranked[i]), top - (CHEAP if _cheap(ranked[i]) else CLOSE)) for i in wanted]
+    asked = [
+        (ranked[i], free(ranked[i]), top - (CHEAP if _cheap(ranked[i]) else CLOSE), seed) for i in wanted
+    ]
     for number, (i, better) in enumerate(zip(wanted, spread(integrated, asked), strict=True)):
         ranked[i] = better
         tell("integrating", (number + 1) / len(wanted))
@@ -122,15 +129,15 @@ def _cheap(ranked: Ranked) -> bool:
     return ranked.simulation.law == EACH and len(ranked.best.u) > SETTLES
 
 
-def _searched_again(spread: Spread, ranked: list[Ranked]) -> list[Ranked]:
+def _searched_again(spread: Spread, ranked: list[Ranked], seed: int) -> list[Ranked]:
     """The models whose many rates could yet make them the best, with the best of further searches.
 
     Their modes are too many for any one search to find the best.
     """
     close = max(r.log_evidence for r in ranked) - NEAR
     wanted = [i for i, r in enumerate(ranked) if r.simulation.law == EACH and r.log_evidence >= close]
-    free, seeds = _free(ranked), range(1, 1 + AGAIN)
-    tasks = [(ranked[i], free(ranked[i]), seed) for i in wanted for seed in seeds]
+    free, first = _free(ranked), 1 + (1 + AGAIN) * seed
+    tasks = [(ranked[i], free(ranked[i]), first + n) for i in wanted for n in range(AGAIN)]
     found = list(spread(_search_again, tasks))
     for number, i in enumerate(wanted):
         ranked[i] = max([ranked[i], *found[number * AGAIN : (number + 1) * AGAIN]], key=_evidence)
@@ -178,16 +185,16 @@ def _ranked(problem: Problem, simulation: Simulation, fits: list[Fit]) -> Ranked
     return Ranked(simulation, fits, float(np.logaddexp.reduce(terms)), ceiling=max(reached))
 
 
-def integrated(task: tuple[Ranked, Ranked | None, float]) -> Ranked:
+def integrated(task: tuple[Ranked, Ranked | None, float, int]) -> Ranked:
     """The model with its evidence by quadrature or annealing; what takes long, if ``worth`` it (nats).
 
     ``free`` is the same model with moduli free at each level.
     """
-    ranked, free, worth = task
+    ranked, free, worth, seed = task
     problem = held_problem()
     blueprint = blueprint_of(problem, ranked.simulation)
     rates = _rates_by_size(problem, ranked.simulation, free)
-    value, error = log_evidence_beyond_laplace(problem, blueprint, ranked.fits, worth, rates)
+    value, error = log_evidence_beyond_laplace(problem, blueprint, ranked.fits, worth, rates, seed)
     return replace(ranked, log_evidence=value, error=error)
 
 
@@ -269,15 +276,15 @@ def _fit_plain(group: dict[str, Simulation]) -> dict[str, Ranked | None]:
     return found
 
 
-def _fit_rates(task: tuple[dict[str, Simulation], Ranked | None, float]) -> list[Ranked]:
+def _fit_rates(task: tuple[dict[str, Simulation], Ranked | None, float, int]) -> list[Ranked]:
     """The laws with rates of a group; ``free`` is the group's free law, ``worth`` as in :func:`fitted`."""
-    group, free, worth = task
+    group, free, worth, seed = task
     problem = held_problem()
     found: list[Ranked] = []
     for law in (SHARED, EACH):
         if law in group:
             all_said = free is not None and bool(found) and _says_all(found[0], free)
-            rated = fitted(problem, group[law], free, np.inf if all_said else worth)
+            rated = fitted(problem, group[law], free, np.inf if all_said else worth, (1 + AGAIN) * seed)
             found += [] if rated is None else [rated]
     return found
 

@@ -99,6 +99,7 @@ def select(
             space,
             tell=listener,
             always=lambda simulation: declared_or_beside(simulation, declared),
+            seed=seed,
         )
         if not ranked:
             raise InputError(
@@ -112,7 +113,9 @@ def select(
         leading = ranked[:CONFUSED]
         listener("other priors", 0.0)
         before = [known.get(r.simulation.model_dump_json(), r.log_evidence) for r in leading]
-        widened = np.array(list(spread(_widen, list(zip(leading, before, strict=True)))))
+        widened = np.array(
+            list(spread(_widen, [(r, value, seed) for r, value in zip(leading, before, strict=True)]))
+        )
         listener("holding out", 0.0)
         held = list(spread(hold_out, ranked[:HELD_OUT]))
         chosen = _apart(ranked, held, declared)
@@ -153,11 +156,11 @@ def _bridged(ranked: Ranked, weighed: Weighed) -> Ranked:
     return replace(ranked, log_evidence=weighed.bridge.value, error=weighed.bridge.error)
 
 
-def _widen(task: tuple[Ranked, float]) -> list[float]:
+def _widen(task: tuple[Ranked, float, int]) -> list[float]:
     """Log evidence for each of WIDTHS; ``known`` is that under the declared ones."""
-    ranked, known = task
+    ranked, known, seed = task
     problem = held_problem()
-    return under_other_priors(problem, blueprint_of(problem, ranked.simulation), ranked.fits, known)
+    return under_other_priors(problem, blueprint_of(problem, ranked.simulation), ranked.fits, known, seed)
 
 
 def _confuse(task: tuple[Ranked, list[Ranked], int, int, int]) -> Array:
