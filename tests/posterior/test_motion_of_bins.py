@@ -205,6 +205,33 @@ def test_a_dead_stop_has_no_speed_between(phase):
     assert found.rest[found.position >= n] == pytest.approx(1.0)
 
 
+def stairs(every: int, creeps: float) -> tuple[Loops, np.ndarray]:
+    """Strokes of 60 rows at one speed, read anew only every so many rows; the reading creeps meanwhile."""
+    n = 60
+    way = (np.arange(n) + 0.5) * STROKE / n
+    since = np.arange(n) % every
+    read = way - since * STROKE / n * (1.0 - creeps)
+    made = build.loops((150.0,), 12.0, n, cycles=2)
+    return replace(made, displacement_m=np.tile(np.concatenate([read, STROKE - read]), 2)), way
+
+
+@pytest.mark.parametrize("creeps", [0.0, 0.05])
+@pytest.mark.parametrize("every", [2, 3, 5])
+def test_a_reading_that_stands_while_the_force_goes_on_is_no_crosshead_at_rest(every, creeps):
+    """Such strokes keep their bins and have one speed; where the force stands as well the crosshead rests."""
+    made, way = stairs(every, creeps)
+    force = 50.0 - 2e3 * np.tile(np.concatenate([way, STROKE - way]), 2)
+    step = STROKE / 60 / float(np.diff(made.time_s)[0])
+    noise = 0.05 * np.random.default_rng(1).standard_normal(len(force))
+    sticks = bin_loops(replace(made, force_N=force + noise), 12)
+    middle = (sticks.position > 0) & (sticks.position < 11)
+    assert np.bincount(sticks.segment).tolist() == [12] * 4
+    assert not sticks.rest[middle].any()
+    assert sticks.middle().speed[middle] == pytest.approx(step, rel=0.25)
+    held = 50.0 - 2e3 * made.displacement_m
+    assert bin_loops(replace(made, force_N=held + noise), 12).rest.mean() > 0.4
+
+
 @pytest.mark.parametrize("late", [0.02, 0.3, 0.9])
 def test_a_level_s_first_stroke_begins_where_the_others_turn(late):
     """Its first reading is ``late`` steps under way; only the later turns tell, to a hundredth of a step."""
