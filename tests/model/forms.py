@@ -157,3 +157,10 @@ def rubbing(form: str, share: float, pressure: float, **values: float) -> float:
     known = {"K_f": one(0.0), **{name: one(value) for name, value in values.items()}}
     at = middle(setting, displacement=share * setting.stroke, pressure=pressure)
     return -float((force(setting, known, at) - force(without(setting), {"K_f": one(0.0)}, at))[0, 0])
+
+
+def proportional(found: Array, expected: Array) -> None:
+    """One is a number times the other."""
+    found, expected = np.broadcast_arrays(np.ravel(found), np.ravel(expected))
+    i = int(np.argmax(np.abs(expected)))
+    np.testing.assert_allclose(found / found[i], expected / expected[i], rtol=1e-9, atol=1e-12)

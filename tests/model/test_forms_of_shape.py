@@ -10,17 +10,11 @@ import pytest
 from mpam_calib.model.effect import effect
 from mpam_calib.physics.kinematics import SHAPES, radius_inextensible_braid
 
-from .forms import applied, middle, one, rows, setting_for, shaped, start
+from .forms import applied, middle, one, proportional, rows, setting_for, shaped, start
 
 Array = np.ndarray
 ARC = np.pi - 2.0
 """Length that Eq. 2.47 takes for each metre by which the radius grows."""
-
-
-def proportional(found: Array, expected: Array) -> None:
-    found, expected = np.broadcast_arrays(np.ravel(found), np.ravel(expected))
-    i = int(np.argmax(np.abs(expected)))
-    np.testing.assert_allclose(found / found[i], expected / expected[i], rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize(

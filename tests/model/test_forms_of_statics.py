@@ -19,6 +19,7 @@ from .forms import (
     force,
     middle,
     one,
+    proportional,
     rows,
     rubbing,
     setting_for,
@@ -26,14 +27,6 @@ from .forms import (
     start,
     without,
 )
-
-Array = np.ndarray
-
-
-def proportional(found: Array, expected: Array) -> None:
-    found, expected = np.broadcast_arrays(np.ravel(found), np.ravel(expected))
-    i = int(np.argmax(np.abs(expected)))
-    np.testing.assert_allclose(found / found[i], expected / expected[i], rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize(
