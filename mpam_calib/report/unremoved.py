@@ -36,7 +36,8 @@ FAULTS = {
         "recorded again is calibrated with [noise] robust = true"
     ),
     "hum_N": (
-        "a hum of {} N, one frequency in all strokes: mains, a pump, a loose shield, a regulator that hunts?"
+        "a hum of {} N, one frequency in all strokes: mains, a pump, a loose shield, a regulator that hunts, "
+        "a displacement that sticks?"
     ),
     "chatter_N": (
         "the readings scatter by {} N more one way than on the way back: strands that stick and slip, "

@@ -62,7 +62,7 @@ def test_every_fault_of_the_load_cell_has_words() -> None:
     [
         ("repeating_N", "in every stroke at the same place"),
         ("bursts_N", "a loose plug"),
-        ("hum_N", "a regulator that hunts"),
+        ("hum_N", "a regulator that hunts, a displacement that sticks?"),
         ("chatter_N", "a guide that chatters"),
         ("step_N", "use a finer range"),
         ("left_N", "beside every set tried"),
