@@ -239,7 +239,7 @@ def _between_jumps(loops: Loops, inside: NDArray[np.bool_], segment: Ints, strok
 
     steps, jumps, standing = total(under_way), total(moves), total(still)
     alone = (jumps >= FEW_JUMPS) & (total(moves & beside) >= MOSTLY * jumps)
-    goes_on = np.abs(total(still, change)) * steps >= GOES_ON * standing * np.abs(total(under_way, change))
+    goes_on = np.abs(total(still, change)) * steps > GOES_ON * standing * np.abs(total(under_way, change))
     sticks = alone & (standing >= STANDS * steps) & goes_on
     apart = np.ceil(steps / np.maximum(jumps, 1)).astype(np.int64)
     return np.where(sticks, apart, 1)
