@@ -49,13 +49,13 @@ class Stage(IntEnum):
 class Effect:
     """One effect (see the module's docstring).
 
-    ``sentence`` is for a rig engineer; ``source`` names the equation's origin; ``told_by``
-    the measurement that would show it by itself; ``parameters`` gives
-    the priors for a setting; ``apply`` returns the changed state. ``forms`` are other shapes of
-    the same thing with the same parameters, declared as ``id:form``. ``uses_force`` is set where it
-    needs the muscle's own force (a fixture that gives way), which the chain then finds by fixed
-    point. ``needs_braid`` is set where it needs the declared strands, ``comes_last`` where it acts on what
-    the others of its stage add up to. Without ``memory`` it looks at pressure, place,
+    ``sentence`` is for a rig engineer; ``source`` names the equation's origin; ``told_by`` the measurement
+    that would show it by itself, ``resolution`` the least size (SI, by the parameter's name) that this
+    tells in a usual lab; ``parameters`` gives the priors for a setting; ``apply`` returns the changed
+    state. ``forms`` are other shapes of the same thing with the same parameters, declared as ``id:form``.
+    ``uses_force`` is set where it needs the muscle's own force (a fixture that gives way), which the chain
+    then finds by fixed point. ``needs_braid`` is set where it needs the declared strands, ``comes_last``
+    where it acts on what the others of its stage add up to. Without ``memory`` it looks at pressure, place,
     direction, level and force alone, not at what was before. ``bends`` names the drivers (and degrees) along
     which its parameters may vary, all alike, in the form ``id:bent``
     (:mod:`mpam_calib.model.bend`), ``looseness`` how many times as far as usual, and ``kinds`` those of its
@@ -80,6 +80,7 @@ class Effect:
     apply: Apply
     forms: Mapping[str, Apply] = field(default_factory=dict)
     told_by: str = ""
+    resolution: Mapping[str, float] = field(default_factory=dict)
     uses_force: bool = False
     needs_braid: bool = False
     comes_last: bool = False
@@ -154,6 +155,8 @@ def _demand_effect(given: object) -> None:
         demand(callable(function), name, function, "a function")
     loose = is_number(given.looseness) and 0.0 < given.looseness < np.inf
     demand(loose, "looseness", given.looseness, "a number above 0")
+    for name, size in given.resolution.items():
+        demand(is_number(size) and 0.0 < size < np.inf, "resolution", {name: size}, "a size above 0")
     for driver, degree in given.bends.items():
         demand(driver in DRIVERS, "bends", driver, f"one of {', '.join(DRIVERS)}")
         whole = isinstance(degree, int) and not isinstance(degree, bool) and degree > 0

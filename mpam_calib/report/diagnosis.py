@@ -230,7 +230,7 @@ def _meaning(identifier: str, form: str) -> str:
 def _alternatives(content: dict[str, Any], found: Diagnosis, specimen: Specimen) -> list[Block]:
     near, shown = found.verdict.near(), found.verdict.likeliest()
     causes = {c["id"] for c in content["causes"]}
-    small = {c["id"] for c in content["causes"] if too_small(c["parameters"])}
+    small = {c["id"] for c in content["causes"] if too_small(c["id"], c["parameters"])}
     text = (
         f"Other sets within {BESIDE:g} nats of the likeliest (a factor of "
         f"{round(float(np.exp(BESIDE)), -3):,.0f} in probability): {near or 'none'}."
@@ -298,7 +298,7 @@ def _limits(
             "5 %": significant(band["q05"], 2),
             "95 %": significant(band["q95"], 2),
             "unit": parameters[name].printed_unit,
-            "what would show it": TOO_SMALL if too_small({name: band}) else shown_by(e, specimen),
+            "what would show it": TOO_SMALL if too_small(e, {name: band}) else shown_by(e, specimen),
         }
         for e, name, band in bands
     ]

@@ -11,6 +11,7 @@ import pandas as pd
 from mpam_calib.model.effect import effect
 from mpam_calib.report.blocks import Block, DataTable, Text
 from mpam_calib.specimen.recording import Specimen
+from mpam_calib.units import si_factor
 
 STOPS: Final = 0.05
 """Share of its largest blocked force below which a muscle has all but stopped pulling."""
@@ -42,11 +43,6 @@ INSTEAD: Final[dict[str, tuple[Callable[[Specimen], bool], str]]] = {
 }
 """What shows an effect where the measurement that does it usually was made already, or cannot be."""
 
-RESOLUTION: Final = {"delta_alpha_deg": 0.5, "offset_mm": 0.05, "tip_factor": 0.1, "droop_percent": 0.5}
-"""Least sizes that the measurements for them tell, in the units written: an angle on a photograph, a
-crosshead where the muscle just goes taut, ends on a photograph, a pressure sensor. Assumed, as usual in a
-lab."""
-
 TOO_SMALL: Final = "too small for the measurement that would tell a larger one"
 
 STAND_IN: Final = "If one of these is there, what it does may have been put down to another cause."
@@ -62,12 +58,15 @@ def shown_by(identifier: str, specimen: Specimen) -> str:
     return effect(identifier).told_by
 
 
-def too_small(bands: Mapping[str, Mapping[str, float]]) -> bool:
-    """Whether an effect, by the bands of its parameters, is smaller than what its measurement tells."""
-    told = {
-        name: max(abs(band["q05"]), abs(band["q95"])) for name, band in bands.items() if name in RESOLUTION
-    }
-    return bool(told) and all(size < RESOLUTION[name] for name, size in told.items())
+def too_small(identifier: str, bands: Mapping[str, Mapping[str, float]]) -> bool:
+    """Whether an effect, by the bands of its parameters (printed units), is less than what would tell it."""
+    least = effect(identifier).resolution
+    told = [
+        max(abs(bands[name]["q05"]), abs(bands[name]["q95"])) * si_factor(name) < size
+        for name, size in least.items()
+        if name in bands
+    ]
+    return bool(told) and all(told)
 
 
 def telling(

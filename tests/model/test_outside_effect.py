@@ -79,6 +79,7 @@ def test_an_id_can_be_taken_only_once(outside):
         ({"id": "other", "bends": {"swing_N": 1}}, "register:bends: found 'swing_N', expected one of contr"),
         ({"id": "other", "bends": {"time": 0}}, "register:bends: found 0, expected a whole number"),
         ({"id": "other", "looseness": 0.0}, "register:looseness: found 0.0, expected a number above 0"),
+        ({"id": "other", "resolution": {"swing_N": 0}}, "register:resolution: found {'swing_N': 0}"),
         ({"id": "other", "forms": {"a b": _apply}}, "register:forms: found 'a b'"),
     ],
 )

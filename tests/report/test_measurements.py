@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from model import build
 
-from mpam_calib.model.effect import effect
+from mpam_calib.model import effect as registry
+from mpam_calib.model.effect import effect, known_effects
 from mpam_calib.report.blocks import Block, DataTable, Text
 from mpam_calib.report.diagnosis import _alternatives, _limits
-from mpam_calib.report.measurements import STAND_IN, TOO_SMALL, not_tested, shown_by, telling
+from mpam_calib.report.measurements import STAND_IN, TOO_SMALL, not_tested, shown_by, telling, too_small
 
 ORDER = "order_too_low"
 TEST = effect(ORDER).told_by
@@ -84,6 +87,25 @@ def test_a_size_that_the_measurement_would_not_tell_is_not_sent_there(size: floa
         assert (photograph in words_of(blocks)) != small
         assert (instead in words_of(blocks)) == small
     assert telling({"braid_angle"}, set(), specimen, {}, {"braid_angle"}) == TOO_SMALL
+
+
+def test_an_effect_from_outside_says_what_its_measurement_tells(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In SI, where its band is in printed units; of one that says nothing no size is too small."""
+    item = replace(effect("creep"), id="grip", told_by="a dial gauge", resolution={"grip_mm": 2e-5})
+    monkeypatch.setitem(registry._REGISTRY, "grip", item)
+    band = {"mean": 0.0, "sd": 0.01, "q05": -0.015, "q95": 0.01}
+    assert too_small("grip", {"grip_mm": band})
+    assert not too_small("grip", {"grip_mm": band | {"q95": 0.021}})
+    assert not too_small("grip", {"other_mm": band})
+    assert not too_small("creep", {"creep_per_decade": band})
+
+
+def test_what_a_measurement_tells_is_a_size_of_its_effect() -> None:
+    setting: Any = build.blueprint({}).setting()
+    for identifier in known_effects():
+        item = effect(identifier)
+        assert set(item.resolution) <= {p.name for p in item.parameters(setting)}, identifier
+        assert item.told_by or not item.resolution, identifier
 
 
 def test_another_speed_is_asked_for_however_many_there_are() -> None:

@@ -44,6 +44,7 @@ register(
         title="Braid angle",
         sentence="the sleeve's angle at rest is not the declared one",
         told_by="the braid angle, measured on a photograph at rest",
+        resolution={"delta_alpha_deg": 0.5 * DEG},
         source="thesis Eq. 2.1-2.3 with another α0",
         parameters=_parameters,
         apply=_apply,

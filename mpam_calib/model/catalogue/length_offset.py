@@ -11,6 +11,7 @@ from mpam_calib.model.curves import half_test, middle_pressure, power, settled
 from mpam_calib.model.effect import Apply, Effect, Share, Stage, Values, register
 from mpam_calib.model.priors import LogNormal, LongTailed, Normal, Parameter
 from mpam_calib.model.state import Setting, State
+from mpam_calib.units import MM
 
 Array = NDArray[np.float64]
 
@@ -135,6 +136,7 @@ register(
         title="Length offset",
         sentence="the crosshead was zeroed at another length than the muscle's rest length",
         told_by="the crosshead's reading where the unpressurised muscle just goes taut",
+        resolution={"offset_mm": 0.05 * MM},
         source="true shortening = reading + offset",
         parameters=_parameters,
         apply=_apply,

@@ -200,6 +200,7 @@ register(
         title="Pressure droop",
         sentence="the supply does not hold the pressure: at full stroke the muscle sees less than the gauge",
         told_by="a pressure sensor at the muscle itself, or the same loop at a tenth of the speed",
+        resolution={"droop_percent": 0.005},
         source="first order in the stroke: P(1 − droop·x/stroke)",
         parameters=_parameters,
         apply=_apply,

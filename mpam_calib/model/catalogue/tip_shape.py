@@ -97,6 +97,7 @@ register(
         title="Tip shape",
         sentence="the ends are rounded: the working length is shorter than the muscle",
         told_by="a second muscle of twice the length, or a photograph of the contracted ends",
+        resolution={"tip_factor": 0.1},
         source="thesis Eq. 2.46-2.47",
         parameters=_parameters,
         apply=_apply,
