@@ -16,6 +16,7 @@ from mpam_calib.specimen.odd_tensile import odd_tests
 from mpam_calib.specimen.plausibility import longest_contraction
 from mpam_calib.specimen.recording import Floats, Loops, Specimen
 from mpam_calib.specimen.repeats import repeated_rows
+from mpam_calib.specimen.sticking import sticking
 from mpam_calib.specimen.summary import BRANCH_NAMES, sampling_rates, stroke_speeds
 from mpam_calib.units import KPA, MINUTE, MM
 
@@ -63,7 +64,7 @@ def oddities(specimen: Specimen) -> list[str]:
         remarks += _odd_speeds(loops)
         remarks += _odd_cycles(loops) + _cycles_that_go_on(loops, specimen.levels_Pa)
         remarks += _odd_levels(loops, specimen.levels_Pa)
-        remarks += odd_readings(loops, specimen.levels_Pa)
+        remarks += odd_readings(loops, specimen.levels_Pa) + sticking(loops)
     if specimen.force_map is not None:
         remarks += repeated_rows(specimen.force_map)
     if specimen.geometry is not None:

@@ -8,22 +8,16 @@ from numpy.typing import NDArray
 from mpam_calib.model.readings import FAR, TIMES, Readings
 from mpam_calib.specimen.motion import run_ids, run_starts
 from mpam_calib.specimen.recording import Loops
+from mpam_calib.specimen.sticking import AT_REST, between_jumps, under_way
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 LOWEST_PRESSURE = 0.05
 """Share of the highest pressure below which relaxation is not told as a share of less."""
-AT_REST = 0.06
-"""Up to this share of its stroke's largest speed the crosshead is at rest."""
 DEAD_STOP, ABRUPT = 0.2, 0.5
 """Under way with at least this share of it on one side and at rest on the other: a dead stop. So is any less
 where it was under way with the second share before: the motion ended in the step to the row."""
-
-FEW_JUMPS, MOSTLY, STANDS, GOES_ON = 4, 0.8, 0.4, 0.5
-"""A reading of the displacement jumps and stands where it has so many jumps in a stroke, this share of them
-by themselves, stands in this share of the steps, and the force changes meanwhile by this share of what it
-changes in as many others."""
 
 
 def row_readings(loops: Loops) -> Readings:
@@ -187,10 +181,9 @@ def _speeds(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array
     At rest the speed is the one that the stroke otherwise has: friction does not vanish with the motion.
     """
     rows = np.arange(len(segment))
-    low, high = (f.reduceat(loops.displacement_m, first)[segment] for f in (np.minimum, np.maximum))
-    inside = np.minimum(loops.displacement_m - low, high - loops.displacement_m) > 0.005 * (high - low)
+    inside = under_way(loops)
     window = np.maximum(np.add.reduceat(inside.astype(np.int64), first) // 40, 1)
-    window = np.maximum(window, _between_jumps(loops, inside, segment, len(first)))[segment]
+    window = np.maximum(window, between_jumps(loops, inside))[segment]
     local = _within(loops, window, first[segment], last[segment])
     fastest = np.maximum.reduceat(local, first)[segment]
     # In the corner of a dead stop the mean of both sides is a speed that the crosshead never had.
@@ -216,33 +209,6 @@ def _speeds(loops: Loops, first: Ints, last: Ints, segment: Ints) -> tuple[Array
     moving = np.maximum(np.add.reduceat((~rest).astype(np.float64), first), 1.0)
     typical = np.add.reduceat(np.where(rest, 0.0, local), first) / moving
     return np.where(rest, typical[segment], local), rest
-
-
-def _between_jumps(loops: Loops, inside: NDArray[np.bool_], segment: Ints, strokes: int) -> Ints:
-    """Steps (strokes,) from one jump to the next of a reading that jumps and stands; 1 of any other stroke.
-
-    A gauge that sticks, or one that is read out less often than the force, is no crosshead that stops and
-    goes: the force goes on changing while it stands. ``inside`` (rows,) are those away from a stroke's ends.
-    """
-    of = segment[:-1]
-    under_way = inside[:-1] & inside[1:] & (of == segment[1:])
-    step, change = np.abs(np.diff(loops.displacement_m)), np.diff(loops.force_N)
-    longest = np.zeros(strokes)
-    np.maximum.at(longest, of[under_way], step[under_way])
-    still = under_way & (step <= AT_REST * longest[of])
-    moves = under_way & ~still
-    beside = np.append(still[1:], False) & np.append(False, still[:-1])
-
-    def total(which: NDArray[np.bool_], of_what: Array | None = None) -> Array:
-        what = np.ones(len(of)) if of_what is None else of_what
-        return np.asarray(np.bincount(of[which], what[which], strokes), dtype=np.float64)
-
-    steps, jumps, standing = total(under_way), total(moves), total(still)
-    alone = (jumps >= FEW_JUMPS) & (total(moves & beside) >= MOSTLY * jumps)
-    goes_on = np.abs(total(still, change)) * steps > GOES_ON * standing * np.abs(total(under_way, change))
-    sticks = alone & (standing >= STANDS * steps) & goes_on
-    apart = np.ceil(steps / np.maximum(jumps, 1)).astype(np.int64)
-    return np.where(sticks, apart, 1)
 
 
 def _paces(speed: Array, rest: NDArray[np.bool_], segment: Ints) -> Array:
