@@ -11,6 +11,7 @@ from mpam_calib.atomic_files import write_atomically
 from mpam_calib.criticism.diagnose import Diagnosis, Tell, describe, diagnose, extended_effects
 from mpam_calib.criticism.tasks.journal import Journal
 from mpam_calib.errors import InputError
+from mpam_calib.model.effect import known_effects
 from mpam_calib.posterior.material import demand_other, keep_material, material_of
 from mpam_calib.posterior.stored import RUN_FILE
 from mpam_calib.report.diagnosis import diagnosis_page
@@ -38,7 +39,7 @@ def diagnose_to_folder(
     demand_own(run, RUN_FILE, KEPT_FILE)
     demand_other(specimen, run)
     material = material_of(specimen)
-    digest = run_digest(specimen, command="diagnose", seed=seed, material=material)
+    digest = run_digest(specimen, searched=known_effects(), command="diagnose", seed=seed, material=material)
     files = (*FILES, *(f"{EXTENDED}/{file.name}" for file in specimen.files))
     kept = Kept(run, "diagnose", digest, files)
     if kept.finished():

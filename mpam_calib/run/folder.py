@@ -6,6 +6,7 @@ import hashlib
 import importlib.metadata
 import json
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import pandas as pd
 
 from mpam_calib.atomic_files import sweep
 from mpam_calib.calibration import Calibration
-from mpam_calib.model.effect import effect, known_effects
+from mpam_calib.model.effect import effect
 from mpam_calib.posterior.chains.checkpoint import Checkpoint
 from mpam_calib.posterior.stored import POSTERIOR, RUN_FILE, readable, write_draws
 from mpam_calib.prediction.recorded import RECORDED, Recorded
@@ -40,22 +41,25 @@ def versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in PACKAGES}
 
 
-def run_digest(specimen: Specimen, **options: Any) -> str:
+def run_digest(specimen: Specimen, *, searched: Iterable[str] = (), **options: Any) -> str:
     """SHA-256 over data, model, options, versions and code: what decides whether a RUN can be kept.
 
-    Over what is said of where the data come from, too: it may stand in a comment, which no digest of a
-    specimen holds.
+    ``searched`` are effects that may come into the result besides the declared ones. Over what is said of
+    where the data come from, too: it may stand in a comment, which no digest of a specimen holds.
     """
-    content = [specimen.digest, provenance(specimen), options, versions(), _code()]
+    effects = sorted({*specimen.simulation.effect_ids, *searched})
+    content = [specimen.digest, provenance(specimen), options, versions(), effects, _code(effects)]
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def _code() -> str:
-    """SHA-256 over this package's files and the modules whose effects were registered from outside.
+def _code(effects: Iterable[str]) -> str:
+    """SHA-256 over this package's files and the modules that any of the effects come from.
 
     A version stays the same while its code is worked on, and says nothing of a laboratory's own effects.
     """
-    modules = {effect(i).apply.__module__ for i in known_effects()}
+    items = [effect(identifier) for identifier in effects]
+    functions = [f for e in items for f in (e.parameters, e.apply, *e.forms.values(), *e.own.values())]
+    modules = {getattr(f, "__module__", None) or "" for f in functions}
     outside = {getattr(sys.modules.get(name), "__file__", None) for name in modules}
     files = {Path(file) for file in outside if file}
     files |= {path for path in PACKAGE.rglob("*") if path.is_file() and path.suffix != ".pyc"}

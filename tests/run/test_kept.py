@@ -13,7 +13,6 @@ from mpam_calib.run import diagnose, select
 from mpam_calib.run import folder as run_folder
 from mpam_calib.run.files import MARKS
 from mpam_calib.run.kept import Kept
-from mpam_calib.specimen import read
 
 from .command import FAST, RESULTS, Here, contents, stamps
 from .small import loops_text, tensile_text
@@ -330,18 +329,6 @@ def test_a_command_tidies_up_after_itself_alone(tmp_path: Path) -> None:
     assert kept[0].unfinished.begun and not kept[1].unfinished.begun and not older.unfinished.begun
     kept[0].finish()
     assert [p.name for p in (tmp_path / "unfinished").iterdir()] == ["notes.txt"]
-
-
-def test_other_code_is_another_digest(
-    material: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    specimen = read(material)
-    monkeypatch.setattr(run_folder, "PACKAGE", tmp_path)
-    (tmp_path / "law.py").write_text("E = 1\n")
-    before = run_folder.run_digest(specimen, seed=0)
-    assert run_folder.run_digest(specimen, seed=0) == before
-    (tmp_path / "law.py").write_text("E = 2\n")
-    assert run_folder.run_digest(specimen, seed=0) != before
 
 
 def test_a_run_file_of_another_kind_is_no_run(tmp_path: Path, here: Here) -> None:
