@@ -37,10 +37,8 @@ NOT_PHYSICS = (WHITE, CORRELATED, TIME, GROWTH, FREEDOM, SMOOTH, ROUGH, NOISE, M
 
 def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
     """The report's view of a calibration and its bands at the levels."""
-    specimen, model, sampling = calibration.specimen, calibration.model, calibration.sampling
+    specimen, model = calibration.specimen, calibration.model
     summary = calibration.summary
-    worst = summary.iloc[int(summary["rhat"].to_numpy().argmax())]
-    ensembles, steps, walkers, _ = sampling.chain.shape
     observed, remainder, noise = observed_readings(calibration)
     headline = _headline(calibration)
     draws = {item.name: item.draws for item in calibration.reported if item.name in headline}
@@ -52,20 +50,7 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
         summary=summary,
         bands=bands,
         observed=observed,
-        convergence=Convergence(
-            converged=calibration.converged,
-            rhat_max=float(worst["rhat"]),
-            rhat_parameter=str(worst["parameter"]),
-            ess_bulk_min=float(summary["ess_bulk"].min()),
-            ess_tail_min=float(summary["ess_tail"].min()),
-            ensembles=ensembles,
-            walkers=walkers,
-            steps=steps,
-            draws=len(calibration.draws),
-            acceptance=sampling.acceptance,
-            modes=len(sampling.modes),
-            ess_wanted=calibration.ess_wanted,
-        ),
+        convergence=_convergence(calibration),
         levels_kPa=tuple(in_kpa(specimen.levels_Pa)),
         draws=draws,
         prior_draws={name: prior[name] for name in prior if name in headline},
@@ -92,6 +77,26 @@ def view_of(calibration: Calibration, bands: pd.DataFrame) -> CalibrationView:
         pressure_bias_sd_kPa=specimen.sensors.pressure_bias_sd_kPa,
         unsettled_moduli=_unsettled_moduli(specimen),
         early_roots=_early_share(calibration),
+    )
+
+
+def _convergence(calibration: Calibration) -> Convergence:
+    summary, sampling = calibration.summary, calibration.sampling
+    worst = summary.iloc[int(summary["rhat"].to_numpy().argmax())]
+    ensembles, steps, walkers, _ = sampling.chain.shape
+    return Convergence(
+        converged=calibration.converged,
+        rhat_max=float(worst["rhat"]),
+        rhat_parameter=str(worst["parameter"]),
+        ess_bulk_min=float(summary["ess_bulk"].min()),
+        ess_tail_min=float(summary["ess_tail"].min()),
+        ensembles=ensembles,
+        walkers=walkers,
+        steps=steps,
+        draws=len(calibration.draws),
+        acceptance=sampling.acceptance,
+        modes=len(sampling.modes),
+        ess_wanted=calibration.ess_wanted,
     )
 
 

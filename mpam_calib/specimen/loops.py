@@ -96,12 +96,7 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
         notes += setpoint_notes(rows["setpoint_kPa"].to_numpy() * KPA, level, levels_Pa)
     displacement = rows["displacement_mm"].to_numpy() * MM
     returned = returns(displacement, level, branch)
-    if "cycle" in everywhere:
-        cycle = rows["cycle"].to_numpy().astype(np.int64)
-        if "branch" not in everywhere:
-            cycle = cycles_at_turns(cycle, run_ids(clock, level), branch)
-    else:
-        cycle = number_cycles(level, clock, branch, returned)
+    cycle = _cycles(rows, level, clock, branch, returned)
     time, began = one_after_the_other(times)
     loops = Loops(
         time_s=time,
@@ -121,6 +116,14 @@ def read_loops(files: Sequence[DataFile], geometry: Geometry, floor_N: float | N
         temperature_C=rows["temperature_C"].to_numpy() if "temperature_C" in everywhere else None,
     )
     return LoopsRead(loops, levels_Pa, tuple(counts), tuple(notes), "setpoint_kPa" in everywhere)
+
+
+def _cycles(rows: pd.DataFrame, level: Ints, clock: Ints, branch: Ints, returned: Ints) -> Ints:
+    """The cycles (rows,) as they are written, moved to the turns that were found; counted where none are."""
+    if "cycle" not in rows:
+        return number_cycles(level, clock, branch, returned)
+    cycle = rows["cycle"].to_numpy().astype(np.int64)
+    return cycle if "branch" in rows else cycles_at_turns(cycle, run_ids(clock, level), branch)
 
 
 def _notes_of_files(

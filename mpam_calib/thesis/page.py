@@ -98,9 +98,6 @@ def _optimiser(chapter: Chapter3) -> Section:
         columns=["case", "active bound or constraint", "multiplier", "unit"],
     )
     starts = chapter.starts
-    best, free = best_force(200), chapter.case_one.best
-    packed, thin = chapter.packed.best, chapter.packed_monofilament.best
-    losses = ", ".join(f"{loss(200, r * 1e3, 50):.1f} N at {r * 1e3:.2f} mm" for r in MONOFILAMENTS)
     return Section(
         "Design optimisation",
         [
@@ -117,32 +114,46 @@ def _optimiser(chapter: Chapter3) -> Section:
                 "What holds the optimum at 200 kPa, and what it would gain if relaxed. Non-negative "
                 f"multipliers leave {max(one.residual, two.residual):.1%} of the gradient unbalanced.",
             ),
-            Text(
-                f"Case I ends at n = {free.x[4]:.0f} strands of R_br = {free.x[3] * 1e3:.1f} mm, of which "
-                f"{strands_that_fit():.0f} in each direction fit round the muscle. With strands that must "
-                f"fit, the braid takes {best - packed.value:.3f} N instead of {best - free.value:.5f} N "
-                f"(n = {packed.x[4]:.0f}, R_br = {packed.x[3] * 1e3:.2f} mm); with strands no thicker than a "
-                f"real monofilament {best - thin.value:.2f} N (n = {thin.x[4]:.0f}, R_br = "
-                f"{thin.x[3] * 1e3:.2f} mm), and with 50 of them {losses}. That the braid's term is "
-                "negligible follows from strands that no braid has."
-            ),
-            Figure(
-                optimisation.histories(chapter),
-                "Approach by iteration. Interior point passes through designs outside the constraints.",
-                "convergence curves",
-            ),
-            Figure(
-                optimisation.over_pressure(chapter),
-                "Three force models, and the optimum by pressure.",
-                "lines over pressure with printed points",
-            ),
-            Figure(
-                optimisation.sensitivity(chapter),
-                "Post-optimality: R and α one at a time, the wall through the bound of V_bl/V, each ± 5 %.",
-                "three sensitivity curves",
-            ),
+            _braids_share(chapter),
+            *_optimisation_figures(chapter),
         ],
     )
+
+
+def _braids_share(chapter: Chapter3) -> Text:
+    """What the braid takes of the force at the optimum, with the printed strands and with others."""
+    best, free = best_force(200), chapter.case_one.best
+    packed, thin = chapter.packed.best, chapter.packed_monofilament.best
+    losses = ", ".join(f"{loss(200, r * 1e3, 50):.1f} N at {r * 1e3:.2f} mm" for r in MONOFILAMENTS)
+    return Text(
+        f"Case I ends at n = {free.x[4]:.0f} strands of R_br = {free.x[3] * 1e3:.1f} mm, of which "
+        f"{strands_that_fit():.0f} in each direction fit round the muscle. With strands that must "
+        f"fit, the braid takes {best - packed.value:.3f} N instead of {best - free.value:.5f} N "
+        f"(n = {packed.x[4]:.0f}, R_br = {packed.x[3] * 1e3:.2f} mm); with strands no thicker than a "
+        f"real monofilament {best - thin.value:.2f} N (n = {thin.x[4]:.0f}, R_br = "
+        f"{thin.x[3] * 1e3:.2f} mm), and with 50 of them {losses}. That the braid's term is "
+        "negligible follows from strands that no braid has."
+    )
+
+
+def _optimisation_figures(chapter: Chapter3) -> list[Block]:
+    return [
+        Figure(
+            optimisation.histories(chapter),
+            "Approach by iteration. Interior point passes through designs outside the constraints.",
+            "convergence curves",
+        ),
+        Figure(
+            optimisation.over_pressure(chapter),
+            "Three force models, and the optimum by pressure.",
+            "lines over pressure with printed points",
+        ),
+        Figure(
+            optimisation.sensitivity(chapter),
+            "Post-optimality: R and α one at a time, the wall through the bound of V_bl/V, each ± 5 %.",
+            "three sensitivity curves",
+        ),
+    ]
 
 
 def _tables(ledger: Ledger) -> list[Section]:

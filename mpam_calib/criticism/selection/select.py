@@ -29,7 +29,7 @@ from mpam_calib.criticism.selection.odds import declared_or_beside, odds
 from mpam_calib.criticism.selection.ranking import Ranked, blueprint_of, fitted, rank_spread
 from mpam_calib.criticism.selection.space import model_space
 from mpam_calib.criticism.tasks.journal import Journal, journalled
-from mpam_calib.criticism.tasks.spread import held_problem
+from mpam_calib.criticism.tasks.spread import Spread, held_problem
 from mpam_calib.errors import InputError
 from mpam_calib.model.blueprint import MaterialPosterior, Options, draw_blueprint
 from mpam_calib.specimen.declaration import Simulation
@@ -105,17 +105,8 @@ def select(
             raise InputError(
                 specimen.folder / "specimen.toml", "data that none of the models can be fitted to", "others"
             )
-        listener("bridging", 0.0)
-        weighed = list(spread(_weigh, [(r, seed) for r in ranked[:CONFUSED]]))
-        known = {r.simulation.model_dump_json(): w.quadrature for r, w in zip(ranked, weighed, strict=False)}
-        ranked[:CONFUSED] = [_bridged(r, w) for r, w in zip(ranked, weighed, strict=False)]
-        ranked.sort(key=lambda r: -r.log_evidence)
+        ranked, widened, disagreement = _leading_weighed(spread, ranked, seed, listener)
         leading = ranked[:CONFUSED]
-        listener("other priors", 0.0)
-        before = [known.get(r.simulation.model_dump_json(), r.log_evidence) for r in leading]
-        widened = np.array(
-            list(spread(_widen, [(r, value, seed) for r, value in zip(leading, before, strict=True)]))
-        )
         listener("holding out", 0.0)
         held = list(spread(hold_out, ranked[:HELD_OUT]))
         chosen = _apart(ranked, held, declared)
@@ -131,9 +122,26 @@ def select(
         confusion=confusion,
         replicates=replicates,
         sensitivity=prior_sensitivity(widened),
-        disagreement=max((w.difference for w in weighed if np.isfinite(w.difference)), default=float("nan")),
+        disagreement=disagreement,
         noise_guess=float(np.sqrt(problem.noise[0, 0])) if problem.noise_guessed else None,
     )
+
+
+def _leading_weighed(
+    spread: Spread, ranked: list[Ranked], seed: int, tell: Callable[[str, float], None]
+) -> tuple[list[Ranked], Array, float]:
+    """All models with the leading ones bridged, best first; these under other priors; the disagreement."""
+    tell("bridging", 0.0)
+    weighed = list(spread(_weigh, [(r, seed) for r in ranked[:CONFUSED]]))
+    known = {r.simulation.model_dump_json(): w.quadrature for r, w in zip(ranked, weighed, strict=False)}
+    bridged = [_bridged(r, w) for r, w in zip(ranked, weighed, strict=False)]
+    ranked = sorted([*bridged, *ranked[CONFUSED:]], key=lambda r: -r.log_evidence)
+    tell("other priors", 0.0)
+    leading = ranked[:CONFUSED]
+    before = [known.get(r.simulation.model_dump_json(), r.log_evidence) for r in leading]
+    widened = spread(_widen, [(r, value, seed) for r, value in zip(leading, before, strict=True)])
+    differences = (w.difference for w in weighed if np.isfinite(w.difference))
+    return ranked, np.array(list(widened)), max(differences, default=float("nan"))
 
 
 def _weigh(task: tuple[Ranked, int]) -> Weighed:
