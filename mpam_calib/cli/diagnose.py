@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 from mpam_calib.cli.app import app
 from mpam_calib.cli.arguments import AnySeed, RunToWrite, SpecimenPath
@@ -27,6 +28,17 @@ def diagnose(
     with stage_progress() as tell:
         found = diagnose_to_folder(specimen, output, seed=seed, tell=tell)
     said = json.loads((output / "diagnosis.json").read_text(encoding="utf-8"))
-    causes = ", ".join(cause["id"] for cause in said["causes"])
-    print(f"{said['verdict']}{': ' + causes if causes else ''}")
+    print(verdict_line(said))
     tell_page(output, kept=found is None)
+
+
+def verdict_line(said: dict[str, Any]) -> str:
+    """One line on what ``diagnosis.json`` says, with no word that would be taken for more than it is."""
+    from mpam_calib.report.diagnosis_lead import likelier
+
+    word, causes = said["verdict"], ", ".join(cause["id"] for cause in said["causes"])
+    if word == "adequate" and (rival := likelier(said)):
+        return f"adequate, with a doubt: {' and '.join(rival['ids'])} more probable than no cause"
+    if not causes:
+        return str(word)
+    return f"unexplained even with {causes}" if word == "unexplained" else f"{word}: {causes}"

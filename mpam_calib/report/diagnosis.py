@@ -53,6 +53,16 @@ BENT = (
 )
 
 
+AMONG_THEMSELVES = (
+    "No set that was tried removes all that these data show. Their probabilities compare one with another "
+    "alone: even one near 1 says that a set is the least wrong, not that its causes are there."
+)
+"""Of sets beside which structure is left."""
+BUT_A_CELL = (
+    "Their probabilities compare sets of causes with each other alone, and not with a load cell at fault, "
+    "which explains these data nearly as well, or better."
+)
+
 TIMES_BENDS = ", before its bends"
 """A size of a few thousandths may be bent to several hundredths."""
 
@@ -240,6 +250,8 @@ def _alternatives(content: dict[str, Any], found: Diagnosis, specimen: Specimen)
             f" Sets with one cause more, less likely beforehand, that the data do not exclude either: {more} "
             "(in diagnosis.json)."
         )
+    if content["verdict"] == "unexplained":
+        text += f" {AMONG_THEMSELVES if found.verdict.left else BUT_A_CELL}"
     rows = [
         {
             "set": ", ".join(a["ids"]) or "nothing beyond the declared simulation",

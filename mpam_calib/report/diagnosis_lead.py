@@ -88,7 +88,7 @@ def first_screen(content: dict[str, Any], specimen: Specimen) -> list[Block]:
 
 def _headline(content: dict[str, Any]) -> str:
     word = content["verdict"]
-    if word == "adequate" and (rival := _likelier(content)):
+    if word == "adequate" and (rival := likelier(content)):
         return DOUBTED.format(_rivalry(rival, content["probability"]))
     if word == "ambiguous" and _all_in_every_rival(content):
         return MORE
@@ -126,7 +126,7 @@ def _sure_of_fault(content: dict[str, Any]) -> str:
     return "may be"
 
 
-def _likelier(content: dict[str, Any]) -> dict[str, Any] | None:
+def likelier(content: dict[str, Any]) -> dict[str, Any] | None:
     """The likeliest alternative, where it is more probable than the set that is reported."""
     first = max(content["alternatives"], key=lambda a: float(a["probability"]), default=None)
     return first if first is not None and first["probability"] > content["probability"] else None
@@ -144,7 +144,7 @@ def _rivalry(rival: dict[str, Any], none: float) -> str:
 def _verdict(content: dict[str, Any]) -> Verdict:
     """Green only where nothing found is more probable than that there is no fault."""
     word, reasons = content["verdict"], _reasons(content)
-    if word == "adequate" and (rival := _likelier(content)):
+    if word == "adequate" and (rival := likelier(content)):
         said = f"{probability(rival['probability'])}, of no cause {probability(content['probability'])}"
         titles = _titles(rival["ids"])
         return Verdict("Adequate, with a doubt.", "caution", [f"probability of {titles}: {said}", *reasons])
@@ -166,6 +166,8 @@ def _verdict_sentence(content: dict[str, Any]) -> str:
         return f"Unexplained: {either}a load cell at fault."
     if not titles:
         return f"{content['verdict'].capitalize()}: no cause stands by itself."
+    if content["verdict"] == "unexplained":
+        return f"Unexplained even with {titles}."
     return f"{content['verdict'].capitalize()}: {titles}."
 
 

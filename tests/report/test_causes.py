@@ -11,7 +11,15 @@ from criticism.cases import problem_of, specimen_of
 
 from mpam_calib.model.effect import effect
 from mpam_calib.report.blocks import DataTable, Notice, Text
-from mpam_calib.report.diagnosis import BENT, FORMS, _alternatives, _causes, _gain
+from mpam_calib.report.diagnosis import (
+    AMONG_THEMSELVES,
+    BENT,
+    BUT_A_CELL,
+    FORMS,
+    _alternatives,
+    _causes,
+    _gain,
+)
 from mpam_calib.report.diagnosis_lead import _next, _unproven
 
 HOLDS = {
@@ -120,12 +128,37 @@ def test_other_sets_are_counted_without_a_word_that_the_table_contradicts() -> N
     verdict = SimpleNamespace(near=lambda: 4, likeliest=lambda: 5, marginals={})
     alternatives = [{"ids": ["dead_band", "presliding"], "probability": 1e-4}]
     causes = [{"id": "dead_band", "parameters": {}}]
-    content: dict[str, Any] = {"alternatives": alternatives, "causes": causes}
+    content: dict[str, Any] = {"verdict": "named", "alternatives": alternatives, "causes": causes}
     found: Any = SimpleNamespace(verdict=verdict)
     text, _ = _alternatives(content, found, specimen_of("develop-null-006"))
     assert isinstance(text, Text)
     assert "within 10 nats of the likeliest (a factor of 22,000 in probability): 4." in text.html
     assert "hardly" not in text.html
+
+
+@pytest.mark.parametrize(
+    ("word", "left", "said"),
+    [
+        ("named", False, None),
+        ("unexplained", True, AMONG_THEMSELVES),
+        ("unexplained", False, BUT_A_CELL),
+    ],
+)
+def test_a_set_that_is_sure_beside_others_is_not_said_to_be_there(
+    word: str, left: bool, said: str | None
+) -> None:
+    """Beside structure that no set removes even a probability of 0.96 only ranks it."""
+    verdict = SimpleNamespace(near=lambda: 0, likeliest=lambda: 5, marginals={}, left=left)
+    content: dict[str, Any] = {
+        "verdict": word,
+        "alternatives": [{"ids": ["braid_angle"], "probability": 0.964}],
+        "causes": [],
+    }
+    found: Any = SimpleNamespace(verdict=verdict)
+    text, _ = _alternatives(content, found, specimen_of("develop-null-006"))
+    assert isinstance(text, Text)
+    assert ("compare" in text.html) == (said is not None)
+    assert said is None or said in text.html
 
 
 def test_the_stated_share_of_true_sets_is_that_of_the_documents() -> None:

@@ -74,7 +74,7 @@ CREEP = {"id": "creep", "probability": 0.99, "within_declared_uncertainty": Fals
         (-2.3, True, [], "in a way that no known set of causes removes", "no cause stands by itself"),
         (None, True, [], "in a way that no known set of causes removes", "no cause stands by itself"),
         (9.0, False, [], "A load cell at fault explains these data better", "Unexplained: a load cell at"),
-        (-2.3, False, [CREEP], "is wrong, but these data cannot tell all", "Unexplained: creep."),
+        (-2.3, False, [CREEP], "is wrong, but these data cannot tell all", "Unexplained even with creep."),
     ],
 )
 def test_a_set_that_only_a_load_cell_rivals_is_told(

@@ -72,6 +72,7 @@ def test_a_size_that_the_measurement_would_not_tell_is_not_sent_there(size: floa
     photograph = effect("braid_angle").told_by
     band = {"delta_alpha_deg": {"mean": 0.0, "sd": size, "q05": -size, "q95": 0.5 * size}}
     content: dict[str, Any] = {
+        "verdict": "named",
         "causes": [{"id": "braid_angle", "parameters": band}],
         "alternatives": [{"ids": ["creep"], "probability": 0.1}],
         "limits": [{"id": "braid_angle", "parameters": band}],
