@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from mpam_calib.specimen import Specimen
+    from mpam_calib.specimen.recording import ForceMap
 
 
 @app.command()
@@ -108,7 +109,9 @@ def _missing(specimen: Specimen) -> list[str]:
     if not specimen.files:
         missing.append("data files: only simulate can use this specimen")
     if specimen.geometry is not None and specimen.loops is None:
-        missing.append("loops: friction and history cannot be told")
+        # A force map read on the way there and back tells friction by itself.
+        untold = "history" if _both_branches(specimen.force_map) else "friction and history"
+        missing.append(f"loops: {untold} cannot be told")
     if specimen.loops is not None and specimen.blocked_force is None:
         missing.append("blocked_force: a threshold in it would identify the dead-band")
     if specimen.tensile is None and specimen.simulation.moduli == "loops" and specimen.has_muscle_data:
@@ -121,6 +124,12 @@ def _missing(specimen: Specimen) -> list[str]:
     if specimen.geometry is not None and specimen.sensors.force_sd_N is None:
         missing.append("[sensors] force_sd_N: the noise is estimated from the data alone")
     return missing
+
+
+def _both_branches(force_map: ForceMap | None) -> bool:
+    from mpam_calib.specimen.recording import LOADING, UNLOADING
+
+    return force_map is not None and {LOADING, UNLOADING} <= set(force_map.branch.tolist())
 
 
 def _list(title: str, lines: list[str], console: Console) -> None:
