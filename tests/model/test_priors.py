@@ -63,6 +63,7 @@ CASES = {
     "between": (NormalWithin(0.0, 3.0, -1.0, 2.0), stats.truncnorm(-1.0 / 3.0, 2.0 / 3.0, 0.0, 3.0)),
     "no bound": (NormalWithin(0.0, 1.5, -np.inf, np.inf), stats.norm(0.0, 1.5)),
     "log-normal": (LogNormal(0.2, 0.7), stats.lognorm(0.7, scale=0.2)),
+    "log-normal above": (LogNormal(0.2, 0.7, 0.01), stats.lognorm(0.7, loc=0.01, scale=0.2)),
     "half-normal": (HalfNormal(0.2), stats.halfnorm(scale=0.2)),
     "uniform": (Uniform(-1.0, 4.0), stats.uniform(-1.0, 5.0)),
     "log-uniform": (LogUniform(0.01, 3.0), stats.loguniform(0.01, 3.0)),
@@ -136,7 +137,7 @@ def test_widened_priors():
     """Sds, or logarithmic sds, by the factor; bounds that physics sets stay where they are."""
     for factor in (0.5, 2.0):
         assert Normal(3.0, 2.0).widened(factor) == Normal(3.0, factor * 2.0)
-        assert LogNormal(0.2, 0.7).widened(factor) == LogNormal(0.2, factor * 0.7)
+        assert LogNormal(0.2, 0.7, 0.01).widened(factor) == LogNormal(0.2, factor * 0.7, 0.01)
         assert LongTailed(0.2).widened(factor) == LongTailed(factor * 0.2)
         assert HalfLongTailed(0.2).widened(factor) == HalfLongTailed(factor * 0.2)
         assert HalfNormal(0.2).widened(factor).sd == pytest.approx(factor * HalfNormal(0.2).sd)

@@ -38,3 +38,12 @@ def test_starts_outside_are_drawn_again() -> None:
     (state,) = start_states(cast(Collapsed, half), MIXTURE, 50, [0])
     assert np.all(state.coords[:, 0] < 0.0)
     assert np.all(np.isfinite(state.log_prob))
+
+
+def test_starts_are_three_times_as_wide_as_what_was_fitted_and_each_ensemble_has_its_own() -> None:
+    """R-hat would else agree before the ensembles had the time to."""
+    everywhere = cast(Collapsed, Bounded(np.inf))
+    one, other = start_states(everywhere, MIXTURE, 4000, [0, 1])
+    fitted = MIXTURE.draw(4000, np.random.RandomState(2))
+    assert one.coords.std(axis=0) == pytest.approx(3.0 * fitted.std(axis=0), rel=0.06)
+    assert np.abs(np.corrcoef(one.coords[:, 0], other.coords[:, 0])[0, 1]) < 0.06

@@ -25,6 +25,9 @@ def test_exact_on_straight_lines(root, slope):
 def test_zero_where_the_muscle_does_not_pull():
     assert float(first_root(GRID, -1.0 - GRID)) == 0.0
     assert float(first_root(GRID, -GRID)) == 0.0
+    # Nor without any force, nor where it only begins to pull after a contraction that nothing brings about.
+    assert float(first_root(GRID, 0.0 * GRID)) == 0.0
+    assert float(first_root(GRID, GRID)) == 0.0
     # A curve that starts below zero and rises above it pulls nowhere that it could have reached.
     assert float(first_root(GRID, GRID - 0.1)) == 0.0
 
