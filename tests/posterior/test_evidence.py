@@ -13,6 +13,7 @@ from mpam_calib.model.blueprint import Blueprint, Options, draw_blueprint
 from mpam_calib.posterior.density.collapsed import Collapsed
 from mpam_calib.posterior.density.mode import Mode, evaluate
 from mpam_calib.posterior.density.target import build_target, locate, predict_force
+from mpam_calib.posterior.evidence.nested import scatter
 from mpam_calib.posterior.evidence.quadrature import integrate
 from mpam_calib.specimen.recording import Specimen
 
@@ -29,6 +30,23 @@ def test_known_evidences(name):
         found = integrate(density, mode_of(density, dimensions_of(density)), seed)
         assert found.value == pytest.approx(density.exact, abs=INSIDE)
         assert found.error < INSIDE
+
+
+@pytest.mark.parametrize("name", ["gaussian", "skewed"])
+def test_seeds_differ_by_the_error_that_is_stated(name):
+    """Of forty seeds: neither less, as if the error were that of one randomisation, nor more."""
+    density = KNOWN[name]
+    mode = mode_of(density, dimensions_of(density))
+    found = [integrate(density, mode, seed) for seed in range(40)]
+    stated = np.sqrt(np.mean([one.error**2 for one in found]))
+    assert 0.6 * stated < np.std([one.value for one in found], ddof=1) < 1.3 * stated
+
+
+def test_the_error_of_a_mean_of_randomisations():
+    """Means of 1 and 3 about 2: half of it each way, so √½ of it as an sd, and over √2 a half."""
+    value, error = scatter(np.log([[1.0, 1.0], [2.0, 4.0]]))
+    assert value == pytest.approx(np.log(2.0))
+    assert error == pytest.approx(0.5)
 
 
 def test_a_strongly_curved_density():

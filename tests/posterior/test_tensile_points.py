@@ -8,10 +8,15 @@ import numpy as np
 import pytest
 from model import build
 from numpy.typing import NDArray
-from scipy import signal
+from scipy import fft, signal, stats
 
 from mpam_calib.calibration import calibrate
+from mpam_calib.model.blueprint import draw_blueprint
+from mpam_calib.model.model import build_model
+from mpam_calib.model.tensile import NOISE as NOISE_NAME
+from mpam_calib.posterior.density.tensile_piece import tensile_piece
 from mpam_calib.posterior.draws import reported
+from mpam_calib.posterior.likelihood.likeness import LONGEST, SHARES, TIMES, hidden_time
 from mpam_calib.posterior.likelihood.tensile_points import TENSILE_POINTS, gather_tensile
 from mpam_calib.posterior.tested_moduli import moduli_of_test
 from mpam_calib.specimen.recording import Specimen, Tensile
@@ -63,6 +68,20 @@ def test_points_keep_the_sum_of_squares_about_a_straight_law(rows: int) -> None:
         assert of_points == pytest.approx(share * of_rows, rel=1e-9)
 
 
+def test_points_have_the_density_of_all_rows() -> None:
+    """Of a thousand rows that are worth a thousand, under a law without stress: row by row."""
+    strain = np.linspace(0.01, 1.5, 1000)
+    stress = 4e4 * strain + np.random.default_rng(0).standard_normal(1000)
+    test = Tensile(strain, stress)
+    model = build_model(draw_blueprint(rubber(test), build.PLAIN))
+    points = gather_tensile(test, 0.0, 2.0)
+    assert (len(points.strain), points.rows) == (TENSILE_POINTS, 1000)
+    noise = np.array([[0.5], [1e4]])
+    found = tensile_piece(model, {NOISE_NAME: noise}, points).constant
+    rows = stats.norm.logpdf(stress, 0.0, noise).sum(axis=1)
+    assert -0.5 * found == pytest.approx(rows, rel=1e-9)
+
+
 def test_noise_and_bands_do_not_depend_on_how_finely_two_pieces_are_read() -> None:
     noise = []
     for rows in (100, 2000):
@@ -105,6 +124,32 @@ def test_slow_noise_counts_as_the_few_readings_that_it_is(rows: int, time: float
     tests = [Tensile(strain, stress + NOISE * slow_noise(rows, time, seed)) for seed in range(20)]
     worth = np.median([gather_tensile(test, 0.0, 2.0).rows for test in tests])
     assert worth == pytest.approx(rows / (2.0 * time), rel=0.3)
+
+
+def test_how_long_noise_lasts_is_averaged_over_all_that_it_may_be() -> None:
+    """By brute force: the power of each half-wave, for every time, share and size of the noise.
+
+    Flat in the logarithm of the size; no correlation is as probable as all of it. A curve of the third degree
+    has taken the longest half-waves.
+    """
+    n, degree = 60, 3
+    rng = np.random.default_rng(3)
+    left = signal.lfilter([1.0], [1.0, -0.7], rng.standard_normal(n + 50))[50:]
+    wave = np.arange(degree + 1, n)
+    power = fft.dct(left, norm="ortho")[wave] ** 2
+    log_sizes = np.linspace(-6.0, 6.0, 301)[:, None]
+    weight, inverse = [], []
+    for a in np.exp(-1.0 / np.geomspace(0.5, LONGEST * n, TIMES)):
+        lasts = (1.0 - a**2) / np.abs(1.0 - a * np.exp(1j * np.pi * wave / n)) ** 2
+        for share in np.sqrt(np.linspace(0.0, 1.0, SHARES)):
+            spectrum = 1.0 - share + share * lasts
+            each = power / spectrum * np.exp(-log_sizes) + np.log(spectrum) + log_sizes
+            density = np.exp(-0.5 * np.sum(each, axis=1))
+            weight.append(np.sum(density) / (TIMES if share == 0.0 else TIMES * (SHARES - 1)))
+            inverse.append(1.0 / (1.0 - share + share * (1.0 + a) / (1.0 - a)))
+    expected = np.sum(weight) / np.sum(np.multiply(weight, inverse))
+    assert expected > 2.0
+    assert hidden_time(left, degree) == pytest.approx(expected, rel=1e-6)
 
 
 def test_bands_hold_the_law_under_slow_noise() -> None:

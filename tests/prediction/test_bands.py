@@ -94,6 +94,23 @@ def test_a_stroke_s_own_remainder_fades_along_the_contraction_and_is_each_branch
     assert np.corrcoef(loading.T)[0] == pytest.approx(expected, abs=0.06)
 
 
+def test_what_readings_and_strokes_add_is_the_seed_s_own() -> None:
+    model, plain = known()
+    few = plain.thin(50)
+    rough = replace(few, values=few.values | {"stroke_remainder_sd_N": np.full((50, 1), ROUGH)})
+    first, again, other = (
+        force_curves(model, rough, LEVELS[2:], np.zeros(1), seed).force for seed in (4, 4, 5)
+    )
+    without, there = (force_curves(model, few, LEVELS[2:], np.zeros(1), seed).force for seed in (4, 5))
+    assert np.array_equal(first, again)
+    assert not np.allclose(first - without, other - there)
+    first, again, other = (muscle_bands(model, few, LEVELS[2:], seed) for seed in (4, 4, 5))
+    assert first.equals(again)
+    for quantity in ("force_N_observed", "blocked_force_N_observed", "free_contraction_observed"):
+        one, two = (table.loc[table["quantity"] == quantity, "q95"] for table in (first, other))
+        assert not np.isclose(one, two).any()
+
+
 def test_curves_without_a_root_are_marked_where_they_are_more_than_a_few() -> None:
     """Pushed up by a zero of the remainder's; the noise of the cell makes no difference."""
     model, draws = known()
