@@ -8,6 +8,7 @@ from scipy import integrate, special, stats
 
 from mpam_calib.errors import InputError
 from mpam_calib.model.model import build_model
+from mpam_calib.model.noise import correlated_noise_parameters, white_noise_prior
 from mpam_calib.model.priors import (
     TAIL,
     HalfLongTailed,
@@ -131,6 +132,21 @@ def test_every_parameter_of_a_full_model_goes_there_and_back():
     assert len(set(model.names)) == len(model.names)
     u = np.random.default_rng(0).standard_normal((50, len(model.names)))
     assert model.coordinates(model.values(u)) == pytest.approx(u, abs=1e-7)
+
+
+@pytest.mark.parametrize("sd", [None, 1e-6, 0.2])
+def test_noise_is_about_as_large_as_declared_however_small_that_is(sd):
+    """Without a declaration it is three thousandths of the force scale; next to none is little beside it."""
+    assert white_noise_prior(sd, 50.0).from_normal(0.0) == pytest.approx(sd or 0.15, rel=0.11)
+    assert white_noise_prior(sd, 50.0).from_normal(-40.0) > 0.0
+
+
+def test_noise_lasts_for_two_readings_at_least_and_for_much_less_than_a_stroke():
+    """Of 60 s, a thirtieth; of few readings a stroke, twice the least."""
+    setting = blueprint({"order": 2, "law": "linear"}).setting()
+    for reading_time, longest in ((0.01, 2.0), (1.5, 6.0)):
+        _, time = correlated_noise_parameters(setting, 60.0, reading_time)
+        assert (time.prior.low, time.prior.high) == pytest.approx((2.0 * reading_time, longest))
 
 
 def test_widened_priors():

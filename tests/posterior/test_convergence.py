@@ -5,12 +5,13 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from mpam_calib.posterior.chains.convergence import RHAT_LIMIT, diagnose_chains
 from mpam_calib.posterior.chains.sampling import Sampling
 from mpam_calib.posterior.draws import Reported, spread_over
-from mpam_calib.posterior.summary import summarise
+from mpam_calib.posterior.summary import all_converged, summarise
 
 SHAPE = (4, 1500, 16)
 
@@ -169,3 +170,16 @@ def test_a_sampled_parameter_has_no_more_effective_draws_than_were_kept() -> Non
     sampling = Sampling(chain, chain[..., 0], figures, [], 0.3, [0.3])
     table = summarise([Reported("K_f", "", kept.ravel(), 1.0, True, "factor")], ("K_f",), sampling)
     assert table.loc[0, ["ess_bulk", "ess_tail"]].tolist() == [400.0, 400.0]
+
+
+@pytest.mark.parametrize(
+    ("figure", "value"), [("rhat", 1.02), ("ess_bulk", 399.0), ("ess_tail", 399.0), ("ess_tail", 400.0)]
+)
+def test_what_follows_from_parameters_has_to_converge_as_well(figure: str, value: float) -> None:
+    """The sampled parameter's own figures are good, and so are those of all but one that follow from it."""
+    chain = ar1(0.0, 1)
+    sampling = Sampling(chain, chain[..., 0], diagnose_chains(chain), [], 0.3, [0.3])
+    rows = pd.DataFrame({"rhat": 1.0, "ess_bulk": 4000.0, "ess_tail": 4000.0}, index=["K_f", "a_1", "b_1"])
+    assert all_converged(rows, sampling, 400.0)
+    rows.loc["b_1", figure] = value
+    assert all_converged(rows, sampling, 400.0) == (value == 400.0)

@@ -13,7 +13,7 @@ from mpam_calib.model.model import build_model
 from mpam_calib.posterior.density.target import predict_force
 from mpam_calib.posterior.draws import Draws
 from mpam_calib.prediction.bands import stress_draws
-from mpam_calib.prediction.fitted import _taken_up, fitted_force, fitted_stress
+from mpam_calib.prediction.fitted import _directions, _taken_up, fitted_force, fitted_stress
 from mpam_calib.run.view import view_of
 from mpam_calib.specimen import read
 
@@ -56,6 +56,25 @@ def test_the_simulation_and_what_it_leaves_make_up_the_whole_force():
     fitted, square = fitted_force(model, draws, readings)
     np.testing.assert_allclose(square, (whole - fitted) ** 2, atol=1e-9)
     assert square.mean() < 0.9 * np.mean((whole - bare) ** 2)
+
+
+def test_directions_are_newtons_for_each_standard_normal_coordinate():
+    """Without friction the force is straight in the moduli's; in the dead-band's it is nearly so."""
+    declared = {"law": "linear", "order": 2, "friction": "none", "effects": ("dead_band",)}
+    made = build.with_force(build.specimen(declared, build.loops()), np.full(72, 10.0))
+    model = build_model(draw_blueprint(made, build.PLAIN))
+    assert model.chain is not None
+    u, eta = np.zeros((4, len(model.names))), np.zeros((4, sum(model.linear_sizes)))
+    readings = build.rows_of(made.loops)
+    found = _directions(model, Draws(u, model.values(u), eta, 1), readings)
+    columns = model.chain.terms(model.values(u[:1]), readings).columns[0]
+    np.testing.assert_allclose(found[1:], columns.T, rtol=1e-9, atol=1e-9)
+    at = [np.where(np.array(model.names) == "P_DB_kPa", side, 0.0)[None] for side in (-0.01, 0.01)]
+    low, high = (
+        model.chain.force(model.values(point), eta[:1, : columns.shape[1]], readings) for point in at
+    )
+    np.testing.assert_allclose(found[0], (high - low)[0] / 0.02, rtol=0.1, atol=0.1)
+    assert np.abs(found[0]).max() > 2.0
 
 
 def test_so_do_a_rubbers_law_and_what_it_leaves():

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from mpam_calib.specimen import Specimen, read
+from mpam_calib.specimen.close_levels import part_close
+from mpam_calib.specimen.recording import LOADING, UNLOADING
 
 from .folders import DECLARATION, HEADER, Recording, loops, make
 
@@ -104,3 +106,15 @@ def test_levels_of_a_single_direction_are_as_they_were(tmp_path: Path) -> None:
     lines = [f"{a},loading" for a, one in zip(made.text().splitlines()[1:], kept, strict=True) if one]
     specimen = read(make(tmp_path, loops="\n".join([f"{HEADER},branch", *lines]) + "\n"))
     assert specimen.levels_Pa / 1e3 == pytest.approx([100.0, 202.0, 300.0], abs=2.1)
+
+
+@pytest.mark.parametrize(("gap", "levels"), [(2.0, 1), (3.5, 2)])
+def test_levels_are_further_apart_than_thrice_what_each_wanders(gap: float, levels: int) -> None:
+    """Strokes within 1 kPa of each other about 20 kPa, ten at each, both ways; the top level is 100 kPa."""
+    own = np.linspace(20.0, 21.0, 10)
+    medians = 1e3 * np.concatenate([own, own + 1.0 + gap, np.full(10, 100.0)])
+    label = np.repeat([0, 0, 1], 10)
+    branch = np.tile([UNLOADING, LOADING], 15)
+    found = part_close(medians, np.zeros(30), branch, label, 0.0)
+    assert np.unique(found[:20]).tolist() == list(range(levels))
+    assert np.all(found[20:] == levels)
