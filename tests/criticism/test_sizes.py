@@ -62,6 +62,23 @@ def test_draws_weigh_the_forms_by_their_evidence(problem: Problem) -> None:
     assert draws.min() == pytest.approx(low, rel=0.02) and draws.max() == pytest.approx(high, rel=0.02)
 
 
+def test_what_is_told_of_a_size_is_its_draws_mean_sd_and_quantiles(problem: Problem) -> None:
+    """Of a dead-band, which is normal: 1 ± 0.3 of its prior's sds, by draws that are the seed's own."""
+    assert problem.model.setting is not None
+    base = fit(problem, frozenset(["dead_band"]), 0)
+    d = len(base.names)
+    known = replace(base, under=(Under(base.log_evidence, np.full(d, 1.0), np.full(d, 0.3)),))
+    first, again, other = (
+        Sizes((known,), problem.model.setting).told("dead_band", seed)["P_DB_kPa"] for seed in (2, 2, 3)
+    )
+    (parameter,) = effect("dead_band").parameters(problem.model.setting)
+    expected = parameter.prior.from_normal(1.0 + 0.3 * np.array([0.0, -1.645, 1.645]))
+    sd = 0.3 * parameter.prior.sd
+    assert (first.mean, first.q05, first.q95) == pytest.approx(tuple(expected), abs=0.1 * sd)
+    assert first.sd == pytest.approx(sd, rel=0.05)
+    assert first == again != other
+
+
 @pytest.mark.parametrize(("size", "alone"), [(0.05, False), (2.0, True)])
 def test_forms_that_the_data_exclude_are_left_out(problem: Problem, size: float, alone: bool) -> None:
     """A small creep may follow any law of time, a large one its own."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from model import build
 
+from mpam_calib.posterior.likelihood.bins import _beyond_slack
 from mpam_calib.posterior.likelihood.floor import lifted_by_noise, pulling
 from mpam_calib.posterior.likelihood.points import gather_points
 from mpam_calib.specimen.declaration import Sensors
@@ -113,3 +114,13 @@ def test_one_wrong_flag_in_loops_hides_one_row() -> None:
     force = 60.0 - 4e3 * recorded.displacement_m
     wrong = np.arange(len(force)) == 100
     np.testing.assert_array_equal(pulling(replace(recorded, force_N=force, censored=wrong)), ~wrong)
+
+
+def test_slack_begins_where_half_of_the_strokes_of_a_level_and_branch_begin_it() -> None:
+    """Three strokes begin it at 6, 8 and 9 mm; one of another branch, without any, is left as it is."""
+    place = np.tile(np.arange(1.0, 11.0), 4)
+    segment, group = np.repeat(np.arange(4), 10), np.repeat([0, 0, 0, 1], 10)
+    slack = place == np.array([6.0, 8.0, 9.0, np.inf])[segment]
+    found = _beyond_slack(slack, place, segment, group)
+    assert np.array_equal(found, slack | ((group == 0) & (place >= 8.0)))
+    assert not _beyond_slack(np.zeros(40, dtype=bool), place, segment, group).any()
