@@ -63,13 +63,18 @@ def test_a_doubted_fit_that_leaves_its_force_to_the_doubt_takes_no_newton_from_a
 
 
 def test_a_climb_that_ended_badly_gives_no_negative_share(found: Search) -> None:
-    alone = found.spread
+    alone, bad = found.spread, []
 
     def badly(function, tasks):
-        fits = alone(function, tasks)
-        return [replace(f, force=2.0 * f.force) if f.effects == {"dead_band"} else f for f in fits]
+        for one in alone(function, tasks):
+            if one is not None and {e.partition(":")[0] for e in one.effects} == {"dead_band"}:
+                bad.append(replace(one, force=2.0 * one.force))
+                yield bad[-1]
+            else:
+                yield one
 
     shares = misfit_budget(replace(found, spread=badly), CAUSES).shares
+    assert len(bad) == 1 and structured(found.problem, bad[0].force) > 100.0
     assert min(shares.values()) >= 0.0
     assert sum(shares.values()) <= 1.0 + 1e-9
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +32,7 @@ from mpam_calib.model.moduli import rate_names
 from mpam_calib.posterior.density.mode import Mode, evaluate
 from mpam_calib.posterior.evidence.bridge import Bridge
 from mpam_calib.posterior.evidence.expansion import expand
-from mpam_calib.posterior.evidence.quadrature import integrate
+from mpam_calib.posterior.evidence.quadrature import Evidence, integrate
 from mpam_calib.specimen import read
 from mpam_calib.specimen.declaration import Sensors
 from mpam_calib.specimen.recording import ForceMap
@@ -243,6 +245,32 @@ def test_doubled_priors_of_the_moduli_cost_each_a_factor_of_two(problem: Problem
     assert wide - narrow == pytest.approx(exact[1] - exact[0], abs=1e-4)
     occam = -p * np.log(2.0) + 0.375 * float(every[0].eta @ every[0].eta)
     assert wide - narrow == pytest.approx(occam, abs=0.1)
+
+
+def test_of_many_parameters_other_priors_change_a_known_evidence_by_as_much_as_laplace_s(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Whatever Laplace's own figure is."""
+    change = dict(zip(WIDTHS.values(), (0.0, -1.0, 2.0, -3.0, 5.0), strict=True))
+    monkeypatch.setattr(evidence, "many_parameters", lambda fits: True)
+    monkeypatch.setattr(evidence, "_sizes", lambda *task, **_: ({0: -40.0 + change[task[3]]}, {}))
+    nothing: Any = None
+    found = under_other_priors(nothing, nothing, [], -17.0, 0)
+    assert found == pytest.approx([-17.0, -18.0, -15.0, -20.0, -12.0])
+
+
+def test_errors_of_the_sizes_count_by_their_share_of_the_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two sizes, one of which has three quarters of it, and of one whose error is not known."""
+    at = np.zeros(1)
+    inner = {size: (None, Evidence(0.0, error, at, at)) for size, error in ((0, 0.4), (1, 0.8))}
+    terms = {0: np.log(0.75), 1: np.log(0.25), 2: -100.0}
+    monkeypatch.setattr(evidence, "_sizes", lambda *_, **__: (dict(terms), inner))
+    nothing: Any = None
+    fits: Any = [SimpleNamespace(u=at)]
+    blueprint: Any = SimpleNamespace(simulation=SimpleNamespace(law="linear"))
+    value, error = log_evidence_beyond_laplace(nothing, blueprint, fits)
+    assert value == pytest.approx(0.0, abs=1e-12)
+    assert error == pytest.approx(np.hypot(0.75 * 0.4, 0.25 * 0.8))
 
 
 def test_shares_under_other_priors() -> None:

@@ -19,6 +19,7 @@ from mpam_calib.criticism.selection.rates import Rates, find_rates
 from mpam_calib.criticism.selection.space import model_space
 from mpam_calib.criticism.tasks.spread import Alone
 from mpam_calib.model.blueprint import Blueprint
+from mpam_calib.specimen.declaration import Simulation
 from mpam_calib.specimen.recording import ForceMap
 
 SIZE = 1
@@ -162,3 +163,20 @@ def test_only_models_near_the_top_are_searched_again(own: Problem, off: float, a
     first = replace(free, log_evidence=top)
     _, found = ranking._searched_again(Alone(own), [first, bad], seed=0)
     assert found.log_evidence == pytest.approx((right if again else bad).log_evidence, abs=0.5)
+
+
+def test_no_search_has_the_seed_of_another() -> None:
+    """Neither a further one of the same ranking nor any of a ranking under another seed."""
+    simulation = Simulation(law="exponential_each", order=2)
+    own = ranking.Ranked(simulation, [], 0.0)
+    seen: list[int] = []
+
+    def spread(function, tasks):
+        for before, _, seed in tasks:
+            seen.append(seed)
+            yield before
+
+    for seed in range(4):
+        seen.append((1 + ranking.AGAIN) * seed)  # the first search's
+        ranking._searched_again(spread, [own], seed)
+    assert len(seen) == len(set(seen)) == 4 * (1 + ranking.AGAIN)

@@ -18,7 +18,7 @@ from mpam_calib.run.synthetic import demand_synthetic_folder
 from mpam_calib.specimen import read
 
 from .command import Here, contents, stamps
-from .small import ALPHA0, L0, MODULI, R0, SIMULATION, Specimen, loops_text, static_force
+from .small import ALPHA0, L0, MODULI, R0, SIMULATION, Specimen, free_contraction, loops_text, static_force
 
 UNITS = {"dead_band": "kPa", "braid_angle": "°", "length_offset": "mm"}
 
@@ -94,6 +94,28 @@ def test_declared_moduli_are_put_in_as_declared(tmp_path: Path) -> None:
     put = simulate(specimen).parameters
     assert (put["E_1"], put["E_2"]) == pytest.approx((4.0e4, 2.6e4))
     assert put["K_f"] == pytest.approx(0.0787)
+
+
+def test_without_data_the_test_is_the_thesis_s(tmp_path: Path) -> None:
+    """From free contraction to L0 and back at each of five levels, 50 mm/min, a hundred readings a second.
+
+    The noise is the seed's own.
+    """
+    simulation = '[simulation]\nmoduli = "tensile"\nE_Pa = [4.0e4, 2.6e4]\nfriction = "coulomb"\n'
+    specimen = read(Specimen(simulation=simulation).write(tmp_path / "own"), data_required=False)
+    loops, again, other = (simulate(specimen, seed=seed).specimen.loops for seed in (0, 0, 1))
+    assert loops is not None and again is not None and other is not None
+    assert np.diff(loops.time_s) == pytest.approx(0.01)
+    step = np.diff(loops.displacement_m)[np.diff(loops.stroke) == 0]
+    assert np.abs(step) == pytest.approx(50e-3 / 60.0 / 100.0, rel=2e-3)
+    first, rows = loops.strokes
+    assert loops.branch[first].tolist() == 5 * [1, -1]
+    assert loops.pressure_Pa[first] == pytest.approx(np.repeat([50e3, 100e3, 150e3, 200e3, 250e3], 2))
+    assert loops.displacement_m[first + rows - 1][::2] == pytest.approx(np.zeros(5))
+    ends = [free_contraction(kPa, ((0.0, 4.0e4), (0.0, 2.6e4))) for kPa in (50.0, 100.0, 150.0, 200.0, 250.0)]
+    assert loops.displacement_m[first][::2] / (1e-3 * L0) == pytest.approx(ends, abs=2e-3)
+    assert np.array_equal(loops.force_N, again.force_N)
+    assert (loops.force_N - other.force_N).std() == pytest.approx(np.sqrt(2.0) * 0.25, rel=0.05)
 
 
 def test_without_data_a_size_refers_to_the_test_that_is_made(tmp_path: Path) -> None:
