@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from model import build
 
 from mpam_calib.calibration import calibrate
+from mpam_calib.posterior import material
 from mpam_calib.posterior.draws import reported
 from mpam_calib.posterior.tested_moduli import moduli_of_test
 from mpam_calib.specimen.declaration import Simulation
@@ -98,3 +100,21 @@ def test_stiff_rubbers_are_the_same_in_other_units() -> None:
         each.append((np.array(found.mean) / size, np.array(found.covariance) / size**2))
     np.testing.assert_allclose(each[1][0], each[0][0], rtol=1e-5)
     np.testing.assert_allclose(each[1][1], each[0][1], rtol=1e-3)
+
+
+def test_moduli_of_another_run_go_together_as_its_draws_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two moduli of which one is the lower the higher the other is."""
+    first, apart = np.random.default_rng(0).standard_normal((2, 500))
+    draws = {"E_1": 2e5 + 1e4 * first, "E_2": 6e4 - 3e3 * first + 1e3 * apart, "other": first}
+    blueprint = SimpleNamespace(simulation=Simulation(order=2, law="constant"), tensile_range=(0.0, 1.0))
+    run = SimpleNamespace(model=SimpleNamespace(blueprint=blueprint, tensile=None), draws=None)
+    listed = [SimpleNamespace(name=name, draws=values) for name, values in draws.items()]
+    monkeypatch.setattr(material, "load_run", lambda folder: run)
+    monkeypatch.setattr(material, "reported", lambda model, draws: listed)
+    found = material.material_of(build.specimen({"moduli": "run:elsewhere", "order": 2}, levels_kPa=(100.0,)))
+    assert found is not None and found.strain_range is None
+    assert found.mean == pytest.approx((2e5, 6e4), rel=0.01)
+    expected = [[1e8, -3e7], [-3e7, 1e7]]
+    np.testing.assert_allclose(found.covariance, expected, rtol=0.15)
+    correlation = found.covariance[0][1] / np.sqrt(found.covariance[0][0] * found.covariance[1][1])
+    assert correlation == pytest.approx(np.corrcoef(draws["E_1"], draws["E_2"])[0, 1])

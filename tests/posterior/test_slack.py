@@ -12,6 +12,7 @@ from scipy import integrate, stats
 
 from mpam_calib.model.blueprint import draw_blueprint
 from mpam_calib.model.readings import Readings
+from mpam_calib.posterior.density.bin_share import BinShare
 from mpam_calib.posterior.density.slack import Slack, with_slack
 from mpam_calib.posterior.density.target import build_target
 from mpam_calib.posterior.likelihood.bins import bin_loops
@@ -142,6 +143,24 @@ def test_no_bin_holds_what_a_floor_made_of_the_force(rows):
         assert np.abs(off[~bins.slack]).max() < 6.0
         assert bins.slack[exact < -2.0 * NOISE].all()
         assert not bins.slack[exact > 8.0 * NOISE].any()
+
+
+def test_a_slack_bin_stays_below_what_its_readings_may_reach_within_all_that_it_may_be_off():
+    """4.5 sds of a reading above the floor; white and lasting noise and the stroke's own remainder, each."""
+    made = build.specimen(recorded=build.loops(rows=40), sensors=Sensors(force_sd_N=NOISE, force_floor_N=2.0))
+    assert made.loops is not None
+    reading = np.maximum(60.0 - 8000.0 * made.loops.displacement_m, 2.0)
+    made = replace(made, loops=replace(made.loops, force_N=reading, censored=reading <= 2.0))
+    target = build_target(made, draw_blueprint(made))
+    bins = target.data.bins
+    assert bins is not None and bins.slack.any()
+    values = target.model.values(np.zeros((2, len(target.model.names))))
+    names = ("noise_sd_N", "noise_corr_sd_N", "stroke_remainder_sd_N")
+    values |= {name: np.array([[sd], [1.0]]) for name, sd in zip(names, (0.2, 0.3, 0.6), strict=True)}
+    slack = BinShare(target.model, bins, target.guide, target.data.floor).at(values).slack
+    assert slack is not None and slack.sd.shape == (2, bins.slack.sum())
+    assert slack.sd == pytest.approx(np.broadcast_to([[0.7], [np.sqrt(3.0)]], slack.sd.shape))
+    assert slack.floor == pytest.approx(np.broadcast_to([[2.9], [6.5]], slack.sd.shape))
 
 
 def test_a_vector_without_a_number_says_nothing_and_spoils_no_other():
