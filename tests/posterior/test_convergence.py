@@ -10,7 +10,7 @@ import pytest
 
 from mpam_calib.posterior.chains.convergence import RHAT_LIMIT, diagnose_chains
 from mpam_calib.posterior.chains.sampling import Sampling
-from mpam_calib.posterior.draws import Reported, spread_over
+from mpam_calib.posterior.draws import Reported, kept_for, spread_over
 from mpam_calib.posterior.summary import all_converged, summarise
 
 SHAPE = (4, 1500, 16)
@@ -143,6 +143,12 @@ def test_kept_draws_say_as_much_as_so_many_can(steps: int, walkers: int) -> None
     own = rho ** np.abs(np.subtract.outer(np.arange(steps), np.arange(steps)))
     every = steps**2 * walkers / float(own.sum())
     assert 1.0 / ess(found) <= 1.0 / every + 1.0 / kept
+
+
+@pytest.mark.parametrize(("wanted", "kept"), [(400.0, 1000), (2000.0, 1000), (4000.0, 2000), (4001.0, 2001)])
+def test_twice_as_many_draws_are_kept_as_effective_ones_are_wanted(wanted: float, kept: int) -> None:
+    """Of four ensembles; a thousand of each at least."""
+    assert kept_for(wanted) == kept
 
 
 def test_what_follows_from_kept_draws_has_no_more_of_them_than_what_it_follows_from() -> None:

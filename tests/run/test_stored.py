@@ -7,6 +7,8 @@ import os
 import shutil
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from mpam_calib.errors import InputError
@@ -116,3 +118,16 @@ def test_a_finished_run_that_may_not_be_written_is_kept(
     refused = here("calibrate", material, "-o", copy, "--seed", 1)
     assert refused.code == 2
     assert "found a folder that may not be written" in refused.complaint
+
+
+def test_a_seed_changes_what_readings_add_and_nothing_else(copy: Path, here: Here) -> None:
+    """Without one it is the run's own, which is 0."""
+    tables = []
+    for seed in ((), ("--seed", 0), ("--seed", 1)):
+        assert here("predict", copy, *seed).code == 0
+        tables.append(pd.read_csv(copy / "predictions.csv"))
+    own, same, other = tables
+    assert own.equals(same)
+    observed = own["quantity"].str.endswith("_observed")
+    assert observed.any() and own[~observed].equals(other[~observed])
+    assert not np.isclose(own.loc[observed, "q95"], other.loc[observed, "q95"], rtol=1e-6).all()
