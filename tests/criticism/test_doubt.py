@@ -71,6 +71,17 @@ def test_where_the_form_holds_nothing_is_doubted_away(problem: Problem) -> None:
     assert found.u[found.names.index("offset_mm")] == pytest.approx(SIZE, abs=0.1 * SIZE)
 
 
+def test_every_doubt_has_an_equal_say(problem: Problem) -> None:
+    """The mean of their evidences: of the same one several times over it is that of the one."""
+    effects = frozenset(["dead_band"])
+    once, thrice = (fit(problem, effects, 0, doubts=(0.0,) * count) for count in (1, 3))
+    assert thrice.log_evidence == pytest.approx(once.log_evidence, abs=1e-9)
+    every = fit(problem, effects, 0, doubts=DOUBTS)
+    each = np.array([under.log_evidence for under in every.under])
+    assert each[0] == pytest.approx(once.log_evidence, abs=1e-9) and len(each) == len(DOUBTS)
+    assert np.exp(every.log_evidence - each.max()) == pytest.approx(np.mean(np.exp(each - each.max())))
+
+
 def test_draws_weigh_the_doubts_by_their_evidence(problem: Problem) -> None:
     """Three to one for the second of two: three of four draws are its own, with its mode and sd."""
     found = fit(problem, frozenset([CAUSE]), 0)

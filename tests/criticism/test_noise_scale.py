@@ -10,7 +10,7 @@ from criticism.cases import problem_of, specimen_of
 from criticism.test_evidence import loops_of_a_rig
 from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import Fit, fit
-from mpam_calib.criticism.fitting.noise_scale import noise_scale, settle_noise
+from mpam_calib.criticism.fitting.noise_scale import _by_scale, noise_scale, settle_noise
 from mpam_calib.criticism.selection.space import model_space
 from mpam_calib.specimen.declaration import Sensors
 from mpam_calib.specimen.recording import ForceMap, Specimen
@@ -33,6 +33,15 @@ def test_noise_that_is_taken_for_too_large_or_too_small_is_put_right(drawn: Prob
     supposed = drawn.with_noise_scale(wrong)
     assert supposed.noise_level == drawn.noise_level
     assert wrong * noise_scale(supposed, fits(supposed)) == pytest.approx(1.0, abs=0.07)
+
+
+def test_settled_parameters_widen_with_the_noise(drawn: Problem) -> None:
+    """The evidence at another scale, the mode held, is that of a fit there (about linear)."""
+    one = fit(drawn, frozenset(), 0)
+    scales = np.array([-0.2, 0.2])
+    found = _by_scale(drawn, [one], scales) - one.log_share
+    again = [fit(drawn.with_noise_scale(float(np.exp(s))), frozenset(), 0) for s in scales]
+    assert found == pytest.approx([f.log_evidence - one.log_evidence for f in again], abs=0.05)
 
 
 def test_smooth_misfit_is_not_taken_for_noise(drawn: Problem) -> None:

@@ -9,7 +9,7 @@ import pytest
 from model import build
 
 from mpam_calib.model.blueprint import draw_blueprint
-from mpam_calib.model.readings import FAR, TIMES
+from mpam_calib.model.readings import FAR, TIMES, Readings
 from mpam_calib.posterior.likelihood.bins import bin_loops
 from mpam_calib.posterior.likelihood.row_motion import row_readings
 from mpam_calib.posterior.likelihood.white import Nodes
@@ -319,3 +319,23 @@ def test_nodes_of_a_bin_have_the_motion_of_its_rows():
         own = np.asarray(getattr(rows, name)).reshape(len(start), 20, -1).mean(axis=1)
         mean = np.sum(weight[..., None] * at_nodes, axis=0) / weight.sum(axis=0)[:, None]
         assert mean == pytest.approx(own, abs=1e-9 * np.abs(own).max()), name
+
+
+def test_the_middle_of_two_places_is_their_mean():
+    rows = Readings.at_rest(np.full(4, 1e5), np.array([1e-3, 2e-3, 3e-3, 6e-3]))
+    rows = replace(rows, travel=np.array([1.0, 2.0, 5.0, 8.0]), behind=np.array([4.0, 0.0, 2.0, 6.0]))
+    middle = rows.middles()
+    assert middle.displacement == pytest.approx([2e-3, 4e-3])
+    assert middle.travel == pytest.approx([3.0, 5.0])
+    assert middle.behind == pytest.approx([3.0, 3.0])
+
+
+def test_nodes_have_the_moments_of_their_rows_up_to_the_fifth():
+    """However lopsided a bin's rows lie: Gauss's rule for three of them."""
+    x = np.random.default_rng(0).gamma(1.5, 1.0, 400)
+    nodes = Nodes.build(x, Readings.at_rest(np.full(400, 1e5), 1e-3 * x), np.array([0, 150]))
+    at, weight = (v.reshape(3, 2) for v in (1e3 * nodes.readings.displacement, nodes.weight))
+    for bin_, rows in enumerate((x[:150], x[150:])):
+        for power in range(6):
+            expected = np.sum(rows**power)
+            assert weight[:, bin_] @ at[:, bin_] ** power == pytest.approx(expected, rel=1e-9)
