@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from criticism.found import search
@@ -51,6 +52,7 @@ def test_a_history_stands_beside_a_ripple_along_the_stroke() -> None:
     assert (verdict.word, verdict.standing) == ("unexplained", frozenset({"creep"}))
 
 
+@pytest.mark.long
 def test_a_name_that_explains_less_than_is_left_does_not_stand() -> None:
     """A crosshead that rings after every turn: friction that turns over late follows a little of it."""
 

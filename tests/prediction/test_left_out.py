@@ -82,6 +82,7 @@ def test_a_law_that_is_wrong_in_pressure_is_told_though_every_level_fits():
     assert (np.sign(inner["bias_N"]) == (-1.0) ** np.arange(1, 6)).all()
 
 
+@pytest.mark.long
 def test_friction_of_a_level_s_own_is_foreseen_from_its_neighbours(sound):
     """As predictions there take it: neither unknown, nor what the readings left out have said of it."""
     simulation = sound.specimen.simulation.model_copy(update={"friction_by_pressure": True})
