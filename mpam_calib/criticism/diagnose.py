@@ -20,7 +20,7 @@ from mpam_calib.criticism.searching.searched import LARGEST, Search
 from mpam_calib.criticism.searching.usual_braid import SHAPE_ALONE, need_strands, with_strands
 from mpam_calib.criticism.sizes import Sizes, Told, sizes_of
 from mpam_calib.criticism.tasks.journal import Journal, journalled
-from mpam_calib.criticism.unexplained.load_cell import Rival
+from mpam_calib.criticism.unexplained.instrument import Rival
 from mpam_calib.criticism.unexplained.structure import Structure, structure_tests
 from mpam_calib.criticism.verdict import Verdict, judge
 from mpam_calib.errors import InputError
@@ -162,7 +162,7 @@ def describe(diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
         "trace": None
         if verdict.trace is None
         else {"against": verdict.trace.against, "rms_N": _round(verdict.trace.size)},
-        "load_cell": told_of(verdict.load_cell, diagnosis.sizes.setting, seed),
+        "instrument": told_of(verdict.instrument, diagnosis.sizes.setting, seed),
         "searched": {
             "sets": len(diagnosis.search.seen | {effects for effects, _ in diagnosis.search.searched}),
             "largest": LARGEST,
@@ -220,12 +220,12 @@ def _in_lab_units(told: dict[str, Told]) -> dict[str, dict[str, float]]:
     }
 
 
-def told_of(cell: Rival | None, setting: Setting, seed: int) -> dict[str, Any] | None:
-    """A load cell at fault, as it is written: its parameters in lab units, and its lead in nats."""
-    if cell is None or cell.fitted is None:
+def told_of(rival: Rival | None, setting: Setting, seed: int) -> dict[str, Any] | None:
+    """An instrument at fault, as it is written: its parameters in lab units, and its lead in nats."""
+    if rival is None or rival.fitted is None:
         return None
-    told = Sizes((cell.fitted,), setting).told(cell.fault, seed)
-    return {"fault": cell.fault, "nats": _round(cell.lead), "parameters": _in_lab_units(told)}
+    told = Sizes((rival.fitted,), setting).told(rival.fault, seed)
+    return {"fault": rival.fault, "nats": _round(rival.lead), "parameters": _in_lab_units(told)}
 
 
 def _limit(diagnosis: Diagnosis, identifier: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from mpam_calib.criticism.fitting.refits import Set
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.unexplained.faults import FAULTLESS, Faults, faults_of
 from mpam_calib.criticism.unexplained.free_strokes import score_beside
-from mpam_calib.criticism.unexplained.load_cell import NO_RIVAL, Rival, load_cell_rival
+from mpam_calib.criticism.unexplained.instrument import NO_RIVAL, Rival, instrument_rival
 from mpam_calib.criticism.unexplained.structure import Structure, structure_tests
 
 Word = Literal["adequate", "named", "ambiguous", "unexplained"]
@@ -39,8 +39,7 @@ class Verdict:
     """The word, the leading set, and every set with its probability (best first).
 
     ``standing`` are the causes that hold even beside a remainder; the leading set leaves the ``faults``, and
-    ``left`` is whether it leaves anything that no set removes;
-    ``load_cell`` is a load cell at fault that comes near
+    ``left`` is whether it leaves anything that no set removes; ``instrument`` is one at fault that comes near
     that set; ``trace`` what that set's residuals still depend on; ``unseen`` are the sets with one cause more
     that the data do not exclude, unless structure is left that would pass for it.
     """
@@ -52,7 +51,7 @@ class Verdict:
     marginals: dict[str, float]
     faults: Faults = FAULTLESS
     left: bool = False
-    load_cell: Rival | None = None
+    instrument: Rival | None = None
     trace: Structure | None = None
     unseen: frozenset[Set] = frozenset()
 
@@ -91,7 +90,7 @@ def judge(found: Search) -> Verdict:
     left = bool(faults) or unlessened or trace is not None or _structure_left(found, leading, size)
     # Where nothing is the likeliest, or cannot be excluded, no structure beyond the noise was shown.
     nothing = not leading or (frozenset() in sets[:LISTED] and probabilities[frozenset()] > 1.0 - SURE)
-    rival = load_cell_rival(found, leading) if left or not nothing else NO_RIVAL
+    rival = instrument_rival(found, leading) if left or not nothing else NO_RIVAL
     gives_way = rival.lead > -LEAD
     if left or gives_way:
         standing = _standing(found, leading)
@@ -99,7 +98,7 @@ def judge(found: Search) -> Verdict:
             standing &= rival.beside
         standing = _outweighing(found, standing)
         held = Verdict("unexplained", leading, standing, probabilities, marginals, faults, left, trace=trace)
-        return replace(held, load_cell=rival) if gives_way else held
+        return replace(held, instrument=rival) if gives_way else held
     if nothing:
         unseen = _unseen(found, frozenset())
         return Verdict("adequate", frozenset(), frozenset(), probabilities, marginals, unseen=unseen)

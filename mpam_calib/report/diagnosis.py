@@ -25,6 +25,7 @@ from mpam_calib.report.figures.misfit import Floats
 from mpam_calib.report.measurements import TOO_SMALL, not_tested, shown_by, telling, too_small
 from mpam_calib.report.numbers import probability, significant, with_band
 from mpam_calib.report.page import Page
+from mpam_calib.report.unremoved import instrument_of
 from mpam_calib.specimen.recording import Specimen
 from mpam_calib.units import KPA
 
@@ -58,8 +59,8 @@ AMONG_THEMSELVES = (
     "alone: even one near 1 says that a set is the least wrong, not that its causes are there."
 )
 """Of sets beside which structure is left."""
-BUT_A_CELL = (
-    "Their probabilities compare sets of causes with each other alone, and not with a load cell at fault, "
+BUT_AN_INSTRUMENT = (
+    "Their probabilities compare sets of causes with each other alone, and not with {} at fault, "
     "which explains these data nearly as well, or better."
 )
 
@@ -251,7 +252,8 @@ def _alternatives(content: dict[str, Any], found: Diagnosis, specimen: Specimen)
             "(in diagnosis.json)."
         )
     if content["verdict"] == "unexplained":
-        text += f" {AMONG_THEMSELVES if found.verdict.left else BUT_A_CELL}"
+        left = found.verdict.left
+        text += f" {AMONG_THEMSELVES if left else BUT_AN_INSTRUMENT.format(instrument_of(content))}"
     rows = [
         {
             "set": ", ".join(a["ids"]) or "nothing beyond the declared simulation",

@@ -13,7 +13,7 @@ from mpam_calib.model.effect import effect
 from mpam_calib.report import wording
 from mpam_calib.report.blocks import Block, Headline, KeyNumber, Notice, Numbers, Verdict
 from mpam_calib.report.numbers import probability, significant
-from mpam_calib.report.unremoved import faults_in_readings, only_recording, unremoved
+from mpam_calib.report.unremoved import faults_in_readings, instrument_of, only_recording, unremoved
 from mpam_calib.specimen.recording import Specimen
 
 LEVELS: dict[str, Literal["good", "caution", "bad"]] = {
@@ -32,12 +32,11 @@ SENTENCES = {
 RECORDING = (
     "The recording {} at fault: before that is put right nothing can be said of the declared simulation."
 )
-UNDECIDED = "These data cannot tell a wrong simulation from a load cell at fault."
+UNDECIDED = "These data cannot tell a wrong simulation from {} at fault."
 PARTLY_UNDECIDED = (
-    "The declared simulation is wrong, but these data cannot tell all that is wrong with it from a load cell "
-    "at fault."
+    "The declared simulation is wrong, but these data cannot tell all that is wrong with it from {} at fault."
 )
-CELL = "A load cell at fault explains these data better than any known set of causes does."
+INSTRUMENT = "{} at fault explains these data better than any known set of causes does."
 MORE = (
     "The declared simulation is wrong, and these data cannot tell whether more is wrong than is named here."
 )
@@ -95,9 +94,10 @@ def _headline(content: dict[str, Any]) -> str:
     if word == "unexplained" and only_recording(content):
         return RECORDING.format(_sure_of_fault(content))
     if word == "unexplained" and _undecided(content):
-        if _of_the_cell(content):
-            return CELL
-        return PARTLY_UNDECIDED if content["causes"] else UNDECIDED
+        instrument = instrument_of(content)
+        if _of_the_instrument(content):
+            return INSTRUMENT.format(instrument.capitalize())
+        return (PARTLY_UNDECIDED if content["causes"] else UNDECIDED).format(instrument)
     return SENTENCES[word]
 
 
@@ -110,18 +110,18 @@ def _all_in_every_rival(content: dict[str, Any]) -> bool:
 
 
 def _undecided(content: dict[str, Any]) -> bool:
-    """Whether the likeliest set leaves nothing, and only a load cell at fault keeps it from its name."""
-    return content["load_cell"] is not None and not content["left"]
+    """Whether the likeliest set leaves nothing, and only an instrument at fault keeps it from its name."""
+    return content["instrument"] is not None and not content["left"]
 
 
-def _of_the_cell(content: dict[str, Any]) -> bool:
-    """Whether a load cell at fault is clearly likelier than the likeliest set."""
-    return float(content["load_cell"]["nats"]) > LEAD
+def _of_the_instrument(content: dict[str, Any]) -> bool:
+    """Whether an instrument at fault is clearly likelier than the likeliest set."""
+    return float(content["instrument"]["nats"]) > LEAD
 
 
 def _sure_of_fault(content: dict[str, Any]) -> str:
-    """A load cell that explains the readings only nearly as well as the simulation is no sure fault."""
-    if faults_in_readings(content) or content["load_cell"]["nats"] > 0.0:
+    """An instrument that explains the readings only nearly as well as the simulation is no sure fault."""
+    if faults_in_readings(content) or content["instrument"]["nats"] > 0.0:
         return "is"
     return "may be"
 
@@ -162,8 +162,8 @@ def _verdict_sentence(content: dict[str, Any]) -> str:
     if content["verdict"] == "unexplained" and only_recording(content):
         return f"Unexplained: the recording {_sure_of_fault(content)} at fault."
     if content["verdict"] == "unexplained" and not titles and _undecided(content):
-        either = "" if _of_the_cell(content) else f"{_titles(content['leading']['ids'])}, or "
-        return f"Unexplained: {either}a load cell at fault."
+        either = "" if _of_the_instrument(content) else f"{_titles(content['leading']['ids'])}, or "
+        return f"Unexplained: {either}{instrument_of(content)} at fault."
     if not titles:
         return f"{content['verdict'].capitalize()}: no cause stands by itself."
     if content["verdict"] == "unexplained":
@@ -187,7 +187,7 @@ def _reasons(content: dict[str, Any]) -> list[str]:
 
 
 def _kept_from_its_name(content: dict[str, Any]) -> list[str]:
-    """The set that explains the readings, where it is a load cell alone that keeps it from its name."""
+    """The set that explains the readings, where it is an instrument alone that keeps it from its name."""
     if not _undecided(content) or only_recording(content):
         return []
     leading = content["leading"]

@@ -4,28 +4,40 @@ from __future__ import annotations
 
 from typing import Any
 
-from mpam_calib.criticism.unexplained.load_cell import FAULT, LATE, RESCALED, ZEROED
+from mpam_calib.criticism.unexplained.instrument import FAULT, LATE, PLAY, RESCALED, ZEROED
 from mpam_calib.criticism.verdict import NOISE_SIZE
 from mpam_calib.report.numbers import significant
 
-CELL_FAULTS = {
-    FAULT: ("that shows less and less of large forces", "load it with dead weights up to the blocked force"),
+INSTRUMENT_FAULTS = {
+    FAULT: (
+        "a load cell that shows less and less of large forces",
+        "load it with dead weights up to the blocked force",
+    ),
     ZEROED: (
-        "whose zero differs from level to level",
+        "a load cell whose zero differs from level to level",
         "look at it with the muscle unhooked, before and after each level",
     ),
     RESCALED: (
-        "whose gain differs from level to level",
+        "a load cell whose gain differs from level to level",
         "hang one dead weight on it before and after each level, and look at its plug and its range",
     ),
     LATE: (
-        "that is read late",
+        "a load cell that is read late",
         "look at its amplifier's filter and at the clocks of force and crosshead, and repeat a level slowly",
     ),
+    PLAY: (
+        "a displacement gauge with play",
+        "turn slowly and see whether the displacement stands while the force goes on, and look at its "
+        "pulley, cord, joints and tip",
+    ),
 }
-"""What a load cell does that explains the readings, and how to look at it."""
+"""What an instrument does that explains the readings, and how to look at it."""
 
-CELL_SIZES = {FAULT: ("cell_knee_N", "from about {} N on"), LATE: ("cell_delay_s", "by about {} s")}
+FAULT_SIZES = {
+    FAULT: ("cell_knee_N", "from about {} N on"),
+    LATE: ("cell_delay_s", "by about {} s"),
+    PLAY: ("play_mm", "of about {} mm"),
+}
 """The parameter of such a fault that is told, and how: without a band, which knows nothing of how roughly
 the fault itself is reckoned."""
 
@@ -53,12 +65,17 @@ def faults_in_readings(content: dict[str, Any]) -> bool:
     return any(content[name] > 0.0 for name in ("saturated_share", *FAULTS))
 
 
+def instrument_of(content: dict[str, Any]) -> str:
+    """The instrument that is, or may be, at fault."""
+    return "a displacement gauge" if content["instrument"]["fault"] == PLAY else "a load cell"
+
+
 def only_recording(content: dict[str, Any]) -> bool:
     """Whether a fault of the recording is all that was found: nothing of the simulation was shown.
 
     No cause, no trace, and no misfit that a reading's noise would not hide.
     """
-    fault = faults_in_readings(content) or content["load_cell"] is not None
+    fault = faults_in_readings(content) or content["instrument"] is not None
     hidden = content["misfit_before_N"] < NOISE_SIZE * content["noise_N"]
     small = content["remainder_N"] == 0.0 or hidden
     return fault and small and not content["causes"] and content["trace"] is None
@@ -74,8 +91,8 @@ def unremoved(content: dict[str, Any]) -> list[str]:
         share = significant(100.0 * content["saturated_share"])
         found.append(f"the load cell saturates: {share} % of the readings lie at one extreme force")
     found += [said.format(significant(content[name])) for name, said in FAULTS.items() if content[name] > 0.0]
-    if content["load_cell"]:
-        found.append(_of_load_cell(**content["load_cell"], read=content["read_N"]))
+    if content["instrument"]:
+        found.append(_of_instrument(**content["instrument"], read=content["read_N"]))
     elif content["left_N"] > 0.0 or not (found or content["trace"]):
         # Where no remainder is needed either, the likeliest set's equations lessen nothing.
         size = significant(content["left_N"] or content["misfit_after_N"])
@@ -86,18 +103,18 @@ def unremoved(content: dict[str, Any]) -> list[str]:
     return found
 
 
-def _of_load_cell(
+def _of_instrument(
     fault: str, nats: float, parameters: dict[str, dict[str, float]], read: tuple[float, float]
 ) -> str:
-    """What a load cell at fault explains, how large the fault is, and where to look for it."""
-    cell, look = CELL_FAULTS[fault]
-    if fault in CELL_SIZES:
-        name, said = CELL_SIZES[fault]
+    """What an instrument at fault explains, how large the fault is, and where to look for it."""
+    does, look = INSTRUMENT_FAULTS[fault]
+    if fault in FAULT_SIZES:
+        name, said = FAULT_SIZES[fault]
         size = parameters[name]["mean"]
         if fault == FAULT and size < read[0]:
             # No reading tells where it begins.
             low, high = (significant(force, 2) for force in read)
-            cell += f" (at all forces read, {low} to {high} N)"
+            does += f" (at all forces read, {low} to {high} N)"
         else:
-            cell += f" ({said.format(significant(size, 2))})"
-    return f"a load cell {cell} explains the readings {'better' if nats > 0.0 else 'nearly as well'}: {look}"
+            does += f" ({said.format(significant(size, 2))})"
+    return f"{does} explains the readings {'better' if nats > 0.0 else 'nearly as well'}: {look}"

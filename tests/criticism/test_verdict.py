@@ -13,7 +13,7 @@ from mpam_calib.criticism.data.problem import SIZES, Problem
 from mpam_calib.criticism.fitting.fit import fit
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.tasks.spread import Alone
-from mpam_calib.criticism.unexplained.load_cell import NO_RIVAL, Rival
+from mpam_calib.criticism.unexplained.instrument import NO_RIVAL, Rival
 from mpam_calib.criticism.verdict import LISTED, Verdict, judge
 
 CAUSE = frozenset(["length_offset"])
@@ -171,7 +171,7 @@ def behind_by(found: Search, effects: frozenset[str], gap: float) -> None:
 
 @pytest.fixture
 def no_rival(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(verdict_module, "load_cell_rival", lambda found, leading: NO_RIVAL)
+    monkeypatch.setattr(verdict_module, "instrument_rival", lambda found, leading: NO_RIVAL)
 
 
 @pytest.mark.usefixtures("no_rival")
@@ -244,7 +244,7 @@ def test_a_remainder_counts_from_half_the_noise_on_or_from_all_that_is_assumed(
     found.fits[NOTHING, 1] = replace(beside, log_evidence=bare.log_evidence + 9.0)
     share = left * problem.noise_level.total
     monkeypatch.setattr(verdict_module, "remainder_rms", lambda problem, fitted: share)
-    monkeypatch.setattr(verdict_module, "load_cell_rival", lambda found, leading: NO_RIVAL)
+    monkeypatch.setattr(verdict_module, "instrument_rival", lambda found, leading: NO_RIVAL)
     monkeypatch.setattr(verdict_module, "_standing", lambda found, leading: leading)
     assert judge(found).word == word
 
@@ -261,11 +261,11 @@ def test_a_load_cell_that_comes_near_takes_the_name_and_what_it_replaces(
     problem: Problem, monkeypatch: pytest.MonkeyPatch, rival: Rival, word: str, standing: frozenset[str]
 ) -> None:
     found = search_where_the_cause_leaves(problem, 0.1)
-    monkeypatch.setattr(verdict_module, "load_cell_rival", lambda found, leading: rival)
+    monkeypatch.setattr(verdict_module, "instrument_rival", lambda found, leading: rival)
     monkeypatch.setattr(verdict_module, "_standing", lambda found, leading: leading)
     verdict = judge(found)
     assert (verdict.word, verdict.standing) == (word, standing)
-    assert verdict.load_cell == (None if word == "named" else rival)
+    assert verdict.instrument == (None if word == "named" else rival)
     assert not verdict.left  # by the set that leads
 
 

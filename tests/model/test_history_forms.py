@@ -257,3 +257,20 @@ def test_a_late_cell_next_to_a_turn_is_read_no_farther_than_the_stroke_s_pace_ta
     moved = np.abs(after.displacement - before.displacement)
     assert np.all(moved <= 0.5 * np.pi * SPEED * 0.3 * (1.0 + 1e-9))
     assert np.all(np.isfinite(after.sign))
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.03, 0.0), (0.01, 0.02), (0.0, 0.03)])
+def test_a_gauge_with_play_is_off_by_it_between_there_and_back(low: float, high: float) -> None:
+    """A pointer that is dragged along: where it moves, the muscle is where the effect says."""
+    setting = setting_for("strand_friction")
+    readings = driven(setting)
+    true, shown, at = readings.displacement, np.empty(len(readings)), 0.0
+    for i, x in enumerate(true):
+        at = min(max(at, x - low * setting.stroke), x + high * setting.stroke)
+        shown[i] = at
+    values = {"play_mm": one((low + high) * setting.stroke), "play_share": one(low / (low + high))}
+    before = start(setting, replace(readings, displacement=shown))
+    after = effect("gauge_play").apply(before, values, setting)
+    moves = np.abs(np.diff(shown, prepend=0.0)) > 1e-12
+    assert 0.9 < np.mean(moves) < 1.0
+    np.testing.assert_allclose(after.displacement[0][moves], true[moves], atol=1e-12)

@@ -14,7 +14,7 @@ from mpam_calib.report.blocks import DataTable, Notice, Text
 from mpam_calib.report.diagnosis import (
     AMONG_THEMSELVES,
     BENT,
-    BUT_A_CELL,
+    BUT_AN_INSTRUMENT,
     FORMS,
     _alternatives,
     _causes,
@@ -141,7 +141,7 @@ def test_other_sets_are_counted_without_a_word_that_the_table_contradicts() -> N
     [
         ("named", False, None),
         ("unexplained", True, AMONG_THEMSELVES),
-        ("unexplained", False, BUT_A_CELL),
+        ("unexplained", False, BUT_AN_INSTRUMENT),
     ],
 )
 def test_a_set_that_is_sure_beside_others_is_not_said_to_be_there(
@@ -153,12 +153,13 @@ def test_a_set_that_is_sure_beside_others_is_not_said_to_be_there(
         "verdict": word,
         "alternatives": [{"ids": ["braid_angle"], "probability": 0.964}],
         "causes": [],
+        "instrument": {"fault": "load_cell"},
     }
     found: Any = SimpleNamespace(verdict=verdict)
     text, _ = _alternatives(content, found, specimen_of("develop-null-006"))
     assert isinstance(text, Text)
     assert ("compare" in text.html) == (said is not None)
-    assert said is None or said in text.html
+    assert said is None or said.format("a load cell") in text.html
 
 
 def test_the_stated_share_of_true_sets_is_that_of_the_documents() -> None:

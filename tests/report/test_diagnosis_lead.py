@@ -10,7 +10,7 @@ import pytest
 from criticism.cases import problem_of, specimen_of
 
 from mpam_calib.criticism.fitting.fit import fit
-from mpam_calib.criticism.unexplained.load_cell import FAULT
+from mpam_calib.criticism.unexplained.instrument import FAULT, PLAY
 from mpam_calib.report.blocks import Figure, Headline, Verdict
 from mpam_calib.report.diagnosis import _budget, _compared, _markers
 from mpam_calib.report.diagnosis_lead import first_screen
@@ -68,21 +68,30 @@ CREEP = {"id": "creep", "probability": 0.99, "within_declared_uncertainty": Fals
 
 
 @pytest.mark.parametrize(
-    ("nats", "left", "causes", "headline", "verdict"),
+    ("fault", "nats", "left", "causes", "headline", "verdict"),
     [
-        (-2.3, False, [], "cannot tell a wrong simulation from a load cell", "braid angle, or a load cell"),
-        (-2.3, True, [], "in a way that no known set of causes removes", "no cause stands by itself"),
-        (None, True, [], "in a way that no known set of causes removes", "no cause stands by itself"),
-        (9.0, False, [], "A load cell at fault explains these data better", "Unexplained: a load cell at"),
-        (-2.3, False, [CREEP], "is wrong, but these data cannot tell all", "Unexplained even with creep."),
+        (FAULT, -2.3, False, [], "a wrong simulation from a load cell at", "braid angle, or a load cell"),
+        (PLAY, -2.3, False, [], "a wrong simulation from a displacement", "braid angle, or a displacement"),
+        (FAULT, -2.3, True, [], "in a way that no known set of causes removes", "no cause stands by itself"),
+        (FAULT, None, True, [], "in a way that no known set of causes removes", "no cause stands by itself"),
+        (FAULT, 9.0, False, [], "A load cell at fault explains these data", "Unexplained: a load cell at"),
+        (
+            PLAY,
+            9.0,
+            False,
+            [],
+            "A displacement gauge at fault explains",
+            "Unexplained: a displacement gauge at",
+        ),
+        (FAULT, -2.3, False, [CREEP], "but these data cannot tell all", "Unexplained even with creep."),
     ],
 )
-def test_a_set_that_only_a_load_cell_rivals_is_told(
-    nats: float | None, left: bool, causes: list[dict[str, Any]], headline: str, verdict: str
+def test_a_set_that_only_an_instrument_rivals_is_told(
+    fault: str, nats: float | None, left: bool, causes: list[dict[str, Any]], headline: str, verdict: str
 ) -> None:
-    size = {"cell_knee_N": {"mean": 3.6}}
-    cell = None if nats is None else {"fault": FAULT, "nats": nats, "parameters": size}
-    content = UNEXPLAINED | {"load_cell": cell, "left": left, "causes": causes}
+    size = {"cell_knee_N": {"mean": 3.6}, "play_mm": {"mean": 0.8}}
+    at_fault = None if nats is None else {"fault": fault, "nats": nats, "parameters": size}
+    content = UNEXPLAINED | {"instrument": at_fault, "left": left, "causes": causes}
     said, box = first_screen(content, specimen_of("develop-null-006"))[:2]
     assert isinstance(said, Headline) and isinstance(box, Verdict)
     assert headline in said.html and verdict in box.sentence

@@ -1,4 +1,4 @@
-"""A load cell that saturates softly: what it does is nobody's cause; a fixture that gives is still named."""
+"""Instruments at fault: what they do is nobody's cause; a fixture that gives and friction are still named."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from criticism.found import search
 from mpam_calib.criticism.diagnose import told_of
 from mpam_calib.criticism.searching.searched import Search
-from mpam_calib.criticism.unexplained.load_cell import FAULT, LATE, load_cell_rival
+from mpam_calib.criticism.unexplained.instrument import FAULT, LATE, PLAY, instrument_rival
 from mpam_calib.criticism.verdict import judge
 from mpam_calib.model.effect import known_effects
 
@@ -62,8 +62,8 @@ def test_a_cell_that_saturates_softly_is_no_cause(cell: Callable[[Array], Array]
     verdict = judge(through(cell, name, RIVALS))
     assert verdict.leading
     assert (verdict.word, verdict.standing) == ("unexplained", frozenset())
-    assert verdict.load_cell is not None
-    assert verdict.load_cell.lead > 10.0
+    assert verdict.instrument is not None
+    assert verdict.instrument.lead > 10.0
 
 
 def test_a_cause_beside_the_cell_stands() -> None:
@@ -72,7 +72,7 @@ def test_a_cause_beside_the_cell_stands() -> None:
     verdict = judge(found)
     assert verdict.word == "unexplained"
     assert verdict.standing <= {"creep"}
-    assert load_cell_rival(found, verdict.leading).beside == {"creep"}
+    assert instrument_rival(found, verdict.leading).beside == {"creep"}
 
 
 @pytest.mark.parametrize(
@@ -82,8 +82,8 @@ def test_a_cause_beside_the_cell_stands() -> None:
 def test_a_fixture_that_gives_is_no_load_cell(name: str, truth: set[str]) -> None:
     found = through(lambda force: force, name, RIVALS)
     verdict = judge(found)
-    assert (verdict.word, verdict.standing, verdict.load_cell) == ("named", truth, None)
-    assert load_cell_rival(found, verdict.leading).lead < -10.0
+    assert (verdict.word, verdict.standing, verdict.instrument) == ("named", truth, None)
+    assert instrument_rival(found, verdict.leading).lead < -10.0
 
 
 @pytest.mark.parametrize(
@@ -129,10 +129,46 @@ def test_a_cell_that_is_read_late_is_no_friction(name: str, delay: float) -> Non
     assert (verdict.word, verdict.standing) == ("unexplained", frozenset())
     setting = problem.model.setting
     assert setting is not None
-    told = told_of(verdict.load_cell, setting, 1)
+    told = told_of(verdict.instrument, setting, 1)
     assert told is not None
     assert told["fault"] == LATE
     assert told["parameters"]["cell_delay_s"]["mean"] == pytest.approx(delay, rel=0.2)
+
+
+def lagging(way: Array, low: float, high: float) -> Array:
+    """What a pointer shows that is dragged ``low`` behind on the way forth and ``high`` ahead on it back."""
+    shown = np.empty(len(way))
+    at = 0.0
+    for i, true in enumerate(way):
+        at = min(max(at, true - low), true + high)
+        shown[i] = at
+    return shown
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [
+        ("develop-null-016", 0.03, 0.0),
+        pytest.param("develop-null-011", 0.01, 0.01, marks=pytest.mark.long),
+    ],
+)
+def test_a_gauge_with_play_is_no_friction(name: str, low: float, high: float) -> None:
+    """Nothing is hidden; the play is told by shares of the largest stroke."""
+    specimen = specimen_of(name)
+    loops = specimen.loops
+    assert loops is not None
+    stroke = loops.displacement_m.max()
+    shown = lagging(loops.displacement_m, low * stroke, high * stroke)
+    problem = problem_of(replace(specimen, loops=replace(loops, displacement_m=shown)))
+    verdict = judge(search(problem, ("strand_friction", "presliding", "length_offset")))
+    assert verdict.leading
+    assert (verdict.word, verdict.standing) == ("unexplained", frozenset())
+    setting = problem.model.setting
+    assert setting is not None
+    told = told_of(verdict.instrument, setting, 1)
+    assert told is not None
+    assert told["fault"] == PLAY
+    assert told["parameters"]["play_mm"]["mean"] == pytest.approx(1e3 * (low + high) * stroke, rel=0.2)
 
 
 @pytest.mark.parametrize(
@@ -142,11 +178,11 @@ def test_a_cell_that_is_read_late_is_no_friction(name: str, delay: float) -> Non
         pytest.param("develop-separable-033", {"rate_friction"}, marks=pytest.mark.long),
     ],
 )
-def test_what_opens_a_loop_is_no_late_cell(name: str, truth: set[str]) -> None:
+def test_what_opens_a_loop_is_no_instrument(name: str, truth: set[str]) -> None:
     found = search(problem_of(specimen_of(name)), OPENING)
     verdict = judge(found)
-    assert (verdict.word, verdict.standing, verdict.load_cell) == ("named", truth, None)
-    assert load_cell_rival(found, verdict.leading).lead < -10.0
+    assert (verdict.word, verdict.standing, verdict.instrument) == ("named", truth, None)
+    assert instrument_rival(found, verdict.leading).lead < -10.0
 
 
 def test_the_faults_are_no_effects_that_a_specimen_may_declare() -> None:

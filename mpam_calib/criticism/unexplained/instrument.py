@@ -1,9 +1,9 @@
-"""A load cell at fault, as a rival of the causes that lead.
+"""An instrument at fault, as a rival of the causes that lead.
 
-Near the end of its range its readings lack more and more of large forces, as if the fixture gave, the wall
-were thinner or an order of the moduli missing: causes that a search names where it has no other word for it.
-With a zero or a gain of its own at every level it passes for a crosshead zeroed anew, and read late for what
-rubs and for what lets go after a turn.
+Near the end of its range a load cell's readings lack more and more of large forces, as if the fixture gave,
+the wall were thinner or an order of the moduli missing: causes that a search names where it has no other word
+for it. With a zero or a gain of its own at every level it passes for a crosshead zeroed anew, and read late
+for what rubs and for what lets go after a turn. A displacement gauge with play passes for what rubs, too.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from mpam_calib.model.effect import effect
 FAULT = "load_cell"
 ZEROED, RESCALED, CROSSHEAD_ZEROED = "load_cell:zeroed", "load_cell:rescaled", "length_offset:rezeroed"
 """A zero or a gain for each level, tried where the leading set has a zero of the crosshead's."""
-LATE, BY_DIRECTION = "late_force", {"presliding", "rate_friction", "coulomb_friction", "strand_friction"}
-"""A cell that is read late, tried where the leading set has what opens a loop."""
+LATE, PLAY = "late_force", "gauge_play"
+"""A cell that is read late and a gauge with play, tried where the leading set has what opens a loop."""
+BY_DIRECTION = {"presliding", "rate_friction", "coulomb_friction", "strand_friction"}
 KNEES = (0.3, 0.6, 0.85)
 """Shares of the largest reading at which a load cell begins to give way where climbs begin."""
 FAR = 3.0
@@ -32,7 +33,7 @@ FAR = 3.0
 
 @dataclass(frozen=True)
 class Rival:
-    """The best set with a load cell's ``fault``: nats ahead of the leading set, causes beside it, fit."""
+    """The best set with an instrument's ``fault``: nats ahead of the leading set, causes beside it, fit."""
 
     lead: float
     beside: Set
@@ -43,14 +44,14 @@ class Rival:
 NO_RIVAL = Rival(-np.inf, frozenset())
 
 
-def load_cell_rival(found: Search, leading: Set) -> Rival:
+def instrument_rival(found: Search, leading: Set) -> Rival:
     """A fault alone, or in place of some of the leading set's causes: at least as plain as that set."""
     chosen = found.best_fit(leading).effects
     faults = [FAULT]
     if CROSSHEAD_ZEROED in chosen:
         faults += [ZEROED, RESCALED]
     if leading & BY_DIRECTION:
-        faults.append(LATE)
+        faults += [LATE, PLAY]
     return max((_rival(found, leading, fault) for fault in faults), key=lambda rival: rival.lead)
 
 
@@ -71,8 +72,8 @@ def _rival(found: Search, leading: Set, fault: str) -> Rival:
         return NO_RIVAL
     best = max(scores, key=lambda s: scores[s])
     fitted = max(by_set[best], key=lambda f: f.log_share)
-    # What opens a loop beside a cell that is read late may be no more than how that is reckoned.
-    beside = best - BY_DIRECTION if fault == LATE else best
+    # What opens a loop beside these may be no more than how they are reckoned.
+    beside = best - BY_DIRECTION if fault in (LATE, PLAY) else best
     return Rival(scores[best] - found.score_of_best(leading), beside, fault, fitted)
 
 
