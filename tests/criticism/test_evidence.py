@@ -202,6 +202,7 @@ def test_leading_models_have_both_hills_of_their_rates(monkeypatch: pytest.Monke
     assert under_other_priors(problem, blueprint, [best], exact, 0) == pytest.approx([exact_wide], abs=0.05)
 
 
+@pytest.mark.long
 def test_another_seed_has_other_points() -> None:
     """Figures differ, but by no more than their errors say."""
     problem = force_map_of_a_constant_law()

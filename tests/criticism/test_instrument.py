@@ -77,7 +77,10 @@ def test_a_cause_beside_the_cell_stands() -> None:
 
 @pytest.mark.parametrize(
     ("name", "truth"),
-    [("develop-separable-039", {"rig_compliance"}), ("develop-separable-015", {"dead_band"})],
+    [
+        ("develop-separable-039", {"rig_compliance"}),
+        pytest.param("develop-separable-015", {"dead_band"}, marks=pytest.mark.long),
+    ],
 )
 def test_a_fixture_that_gives_is_no_load_cell(name: str, truth: set[str]) -> None:
     found = through(lambda force: force, name, RIVALS)

@@ -28,6 +28,7 @@ def judged(name: str, off: Callable[[Loops], Array], tested: tuple[str, ...] = H
     return judge(search(problem, tested))
 
 
+@pytest.mark.long
 def test_a_gain_that_swings_is_no_history() -> None:
     """By 5 % along the test, as a room warms up and cools down: creep that bends follows some of the way."""
 

@@ -99,7 +99,7 @@ def test_a_large_map_is_looked_at_in_part() -> None:
     assert found == pytest.approx(0.005 * blocked, rel=0.2)
 
 
-@pytest.mark.parametrize(("seed", "noise"), [(0, 0.002), (1, 0.01)])
+@pytest.mark.parametrize(("seed", "noise"), [(0, 0.002), pytest.param(1, 0.01, marks=pytest.mark.long)])
 def test_nothing_hidden_is_adequate(seed: int, noise: float) -> None:
     assert verdict_on(map_of(seed, noise)).word == "adequate"
 
@@ -109,7 +109,7 @@ def test_a_cause_is_named_beside_a_noise_that_nobody_declared() -> None:
     assert (found.word, found.standing) == ("named", {"dead_band"})
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_of_a_few_readings_the_noise_is_what_the_models_leave(seed: int) -> None:
     """So few that no neighbours tell it, and several times as noisy as the first guess: no fault is seen."""
     few = map_of(seed, 0.02, points=2)

@@ -152,7 +152,8 @@ CASES = [
     "bins, remainder", "bins of averages", "alike strokes", "rippling pressure", "no branches' friction",
     "dead-band", "strand friction", "free law, friction by level", "exponential", "stretch", "force map",
     "force map without branches", "blocked and free", "all files", "tensile and loops", "tensile alone",
-    "growth, rows", "growth, bins", "growth, bins of averages", "growth, alike strokes", "growth, all files",
+    "growth, rows", "growth, bins", "growth, bins of averages", "growth, alike strokes",
+    pytest.param("growth, all files", marks=pytest.mark.long),
 ]  # fmt: skip
 
 

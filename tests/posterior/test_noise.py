@@ -52,6 +52,7 @@ def test_bursts_spoil_the_bands_unless_noise_is_robust():
     assert 0.8 * SD < noise_sd < 1.5 * SD
 
 
+@pytest.mark.long
 def test_bursts_are_not_taken_for_structure():
     """With the remainders in play as well: they stay small, and friction is found."""
     made, truth = loops_with(ROBUST, bursts=30, seed=0)

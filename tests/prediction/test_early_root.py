@@ -49,6 +49,7 @@ def integrated() -> tuple[Collapsed, Sampling]:
     return target, sample(target, modes, 0, 100)
 
 
+@pytest.mark.long
 def test_the_mean_lies_in_its_band() -> None:
     bands = calibrated().bands()
     free = bands[(bands["quantity"] == "free_contraction") & (bands["pressure_kPa"] > 0.0)]
@@ -56,6 +57,7 @@ def test_the_mean_lies_in_its_band() -> None:
     assert (free["mean"] > free["q05"]).all() and (free["mean"] < free["q95"]).all()
 
 
+@pytest.mark.long
 def test_no_draw_has_an_early_root() -> None:
     made = calibrated()
     early = early_roots(made.target, made.draws)

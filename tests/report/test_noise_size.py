@@ -142,7 +142,8 @@ def found_in(force: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Limit | N
     return noise_size.noise_size(view_of(done := calibrate(specimen), done.bands()))
 
 
-def test_slow_noise_is_ordinary_and_strokes_of_mixed_levels_are_not() -> None:
+@pytest.mark.long
+def test_slow_noise_is_ordinary() -> None:
     rng = np.random.default_rng(4)
 
     def slow(true: np.ndarray, level: np.ndarray) -> np.ndarray:
@@ -153,6 +154,10 @@ def test_slow_noise_is_ordinary_and_strokes_of_mixed_levels_are_not() -> None:
         return true + white + 0.02 * true.max() * lasting
 
     assert found_in(slow) is None
+
+
+def test_strokes_of_mixed_levels_are_not_ordinary() -> None:
+    rng = np.random.default_rng(4)
 
     def mixed(true: np.ndarray, level: np.ndarray) -> np.ndarray:
         white = 0.002 * true.max() * rng.standard_normal(len(true))

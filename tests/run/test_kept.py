@@ -209,7 +209,7 @@ def test_a_small_budget_exits_3_and_a_larger_one_goes_on(
             assert (again / name).read_bytes() == longer[name]
 
 
-@pytest.mark.parametrize("budget", [10, 30])
+@pytest.mark.parametrize("budget", [10, pytest.param(30, marks=pytest.mark.long)])
 def test_what_a_budget_cut_short_is_drawn_whole_by_a_larger_one(
     budget: int, own_material: Path, material_run: Path, tmp_path: Path, here: Here
 ) -> None:
