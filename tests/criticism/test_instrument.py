@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from criticism.found import search
+from mpam_calib.criticism.data.problem import Problem
 from mpam_calib.criticism.diagnose import told_of
 from mpam_calib.criticism.searching.searched import Search
 from mpam_calib.criticism.unexplained.instrument import FAULT, LATE, PLAY, instrument_rival
@@ -116,6 +118,18 @@ OPENING = ("presliding", "rate_friction", "creep")
 """Causes that open a loop, or that time tells."""
 
 
+def told_where_no_cause_stands(problem: Problem, tested: tuple[str, ...]) -> dict[str, Any]:
+    """The instrument at fault, where causes lead and none of them stands."""
+    verdict = judge(search(problem, tested))
+    assert verdict.leading
+    assert (verdict.word, verdict.standing) == ("unexplained", frozenset())
+    setting = problem.model.setting
+    assert setting is not None
+    told = told_of(verdict.instrument, setting, 1)
+    assert told is not None
+    return told
+
+
 @pytest.mark.parametrize(("name", "delay"), [("develop-null-016", 0.1), ("develop-null-011", 0.3)])
 def test_a_cell_that_is_read_late_is_no_friction(name: str, delay: float) -> None:
     """Nothing is hidden, and each force is that of some tenths of a second before."""
@@ -127,13 +141,7 @@ def test_a_cell_that_is_read_late_is_no_friction(name: str, delay: float) -> Non
         here = loops.level == level
         late[here] = np.interp(loops.time_s[here] - delay, loops.time_s[here], loops.force_N[here])
     problem = problem_of(replace(specimen, loops=replace(loops, force_N=late)))
-    verdict = judge(search(problem, ("rate_friction", "pressure_droop")))
-    assert verdict.leading
-    assert (verdict.word, verdict.standing) == ("unexplained", frozenset())
-    setting = problem.model.setting
-    assert setting is not None
-    told = told_of(verdict.instrument, setting, 1)
-    assert told is not None
+    told = told_where_no_cause_stands(problem, ("rate_friction", "pressure_droop"))
     assert told["fault"] == LATE
     assert told["parameters"]["cell_delay_s"]["mean"] == pytest.approx(delay, rel=0.2)
 
@@ -163,13 +171,7 @@ def test_a_gauge_with_play_is_no_friction(name: str, low: float, high: float) ->
     stroke = loops.displacement_m.max()
     shown = lagging(loops.displacement_m, low * stroke, high * stroke)
     problem = problem_of(replace(specimen, loops=replace(loops, displacement_m=shown)))
-    verdict = judge(search(problem, ("strand_friction", "presliding", "length_offset")))
-    assert verdict.leading
-    assert (verdict.word, verdict.standing) == ("unexplained", frozenset())
-    setting = problem.model.setting
-    assert setting is not None
-    told = told_of(verdict.instrument, setting, 1)
-    assert told is not None
+    told = told_where_no_cause_stands(problem, ("strand_friction", "presliding", "length_offset"))
     assert told["fault"] == PLAY
     assert told["parameters"]["play_mm"]["mean"] == pytest.approx(1e3 * (low + high) * stroke, rel=0.2)
 
